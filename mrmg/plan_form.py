@@ -17,20 +17,20 @@ from mrmg.scene.types import Scene
 
 
 def require_form(scene: Scene, plan: Plan) -> None:
-    """Refuse a plan that is malformed.
+    """Refuse a plan whose parts do not fit each other or the scene.
 
     Raises:
         UsageError: naming the first fault.
     """
-    for robot, fault in form_faults(scene, plan):
+    for robot, fault in misfits(scene, plan):
         raise UsageError(
             f"the plan is malformed: {f'{robot}: ' if robot else ''}{fault}; "
             "mrmg.verify(scene, plan) lists all that is wrong with it"
         )
 
 
-def form_faults(scene: Scene, plan: Plan) -> Iterator[tuple[str, str]]:
-    """Yield what is wrong with a plan's form: the robot, "" for the plan, and what."""
+def misfits(scene: Scene, plan: Plan) -> Iterator[tuple[str, str]]:
+    """Yield what does not fit: the robot, "" for the plan, and what."""
     expected = [robot.id for robot in scene.robots]
     planned = [trajectory.robot for trajectory in plan.trajectories]
     if planned != expected:
@@ -44,23 +44,32 @@ def form_faults(scene: Scene, plan: Plan) -> Iterator[tuple[str, str]]:
         yield robot, "states and controls are no tables of 64-bit floats"
     if unusable:
         return
-    steps = {len(trajectory.control) for trajectory in plan.trajectories}
-    if len(steps) > 1 or 0 in steps:
-        counts = sorted(steps)
-        yield "", f"trajectories have {counts} steps, not one equal number"
+    steps = sorted({len(trajectory.control) for trajectory in plan.trajectories})
+    if len(steps) > 1:
+        yield "", f"trajectories have {steps} steps, not one equal number"
     for trajectory in plan.trajectories:
         robot, n = trajectory.robot, len(trajectory.control)
         shapes = (trajectory.state.shape, trajectory.control.shape)
         if shapes != ((n + 1, NX), (n, NU)):
             yield robot, f"states and controls have shapes {shapes}"
-        elif not all(
-            np.isfinite(a).all() for a in (trajectory.state, trajectory.control)
-        ):
-            yield robot, "a state or control is not a finite number"
         if trajectory.dt_s != plan.dt_s:
             yield robot, f"its step is {trajectory.dt_s} s long"
         if robot not in plan.tours:
             yield robot, "the plan has no tour for it"
+
+
+def form_faults(scene: Scene, plan: Plan) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with a plan's form, as `misfits`, which come first."""
+    faults = [*misfits(scene, plan)]
+    yield from faults
+    if faults:
+        return
+    planned = [trajectory.robot for trajectory in plan.trajectories]
+    for one in plan.trajectories:
+        if len(one.control) == 0:
+            yield one.robot, "its trajectory has no steps"
+        if not all(np.isfinite(array).all() for array in (one.state, one.control)):
+            yield one.robot, "a state or control is not a finite number"
     for robot in sorted({visit.robot for visit in plan.visits} - set(planned)):
         yield robot, "visits are stated but no motion"
     for robot, margins in plan.margins.items():

@@ -39,11 +39,14 @@ class Range:
         return above and below and math.isfinite(number)
 
     def __str__(self) -> str:
-        what = "a whole number" if self.whole else "a number"
         least = "above" if self.ends[0] == "(" else "of at least"
         most = "below" if self.ends[1] == ")" else "at most"
-        high = f" and {most} {self.high:g}" if self.high < math.inf else ""
-        return f"{what} {least} {self.low:g}{high}{', or None' * self.optional}"
+        words = f"{'whole ' * self.whole}number {least} {self.low:g}"
+        if self.high < math.inf:
+            words += f" and {most} {self.high:g}"
+        elif words == "number above 0":
+            words = "positive number"
+        return f"a {words}{', or None' * self.optional}"
 
 
 def require_range(name: str, value: object, allowed: Range) -> None:

@@ -17,7 +17,7 @@ from mrmg.ranges import Range
     ("allowed", "inside", "outside", "named"),
     [
         (Range(), [0, 0.0, 7.5], [-1e-9, math.inf], "a number of at least 0"),
-        (Range(ends="(]"), [1e-9], [0, 0.0], "a number above 0"),
+        (Range(ends="(]"), [1e-9], [0, 0.0], "a positive number"),
         (
             Range(0, 1, ends="[)"),
             [0, 0.99],
@@ -58,7 +58,7 @@ def test_each_parameter_is_named_with_what_it_may_be() -> None:
     message = (
         "planner parameters: samples = 'many' must be a whole number of at least 0; "
         "dt_s = 0.5 must be a number above 0 and at most 0.2; budget_s = nan must be a "
-        "number above 0, or None"
+        "positive number, or None"
     )
     with pytest.raises(UsageError) as refused:
         PlannerParams(**wrong)

@@ -92,7 +92,7 @@ def test_the_keywords_of_run_are_its_options() -> None:
         ({"seed": -1}, "seed: -1 is not a whole number of at least 0"),
         ({"seed": 1.5}, "seed: 1.5"),
         ({"trees": True}, "trees: True"),
-        ({"budget_s": 0}, "budget_s: 0 is not a number above 0"),
+        ({"budget_s": 0}, "budget_s: 0 is not a positive number"),
         ({"time_limit": "soon"}, "time_limit_s: 'soon'"),
         ({"soc_margin": 1.0}, "soc_margin: 1.0 is not a number of"),
         ({"profile": "fast"}, "profile: 'fast'; allowed: default, paper"),

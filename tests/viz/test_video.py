@@ -176,8 +176,8 @@ def test_charge_is_that_of_the_battery_a_robot_really_has(
     [
         ({"view": "side"}, "view: 'side'; allowed: top, chase, split"),
         ({"robot": "r9"}, "use one of r1, r2"),
-        ({"speed": 0.0}, "speed: 0.0 is not a number above 0"),
-        ({"speed": float("nan")}, "speed: nan is not a number above 0"),
+        ({"speed": 0.0}, "speed: 0.0 is not a positive number"),
+        ({"speed": float("nan")}, "speed: nan is not a positive number"),
         ({"fps": 0}, "fps: 0 is not a whole number of at least 1"),
         ({"fps": 121}, "1 to 120"),
         ({"size": (641, 360)}, "even numbers"),
