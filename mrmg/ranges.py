@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
+from typing import Any
 
 from mrmg.errors import UsageError
 
@@ -33,10 +34,10 @@ class Range:
         kind = Integral if self.whole else Real
         if isinstance(value, bool) or not isinstance(value, kind):
             return False
-        number = float(value)
+        number: Any = value  # not as a float, which not every whole number fits in
         above = number > self.low if self.ends[0] == "(" else number >= self.low
         below = number < self.high if self.ends[1] == ")" else number <= self.high
-        return above and below and math.isfinite(number)
+        return bool(above and below and number < math.inf)
 
     def __str__(self) -> str:
         least = "above" if self.ends[0] == "(" else "of at least"

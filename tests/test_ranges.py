@@ -47,9 +47,10 @@ def test_what_is_in_a_range_and_how_it_is_named(
     assert str(allowed) == named
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
+def test_numbers_of_any_kind_and_size_are_numbers() -> None:
     assert np.float32(0.5) in Range(0.0, 1.0)
     assert np.int64(3) in Range(whole=True)
+    assert 10**400 in Range(whole=True)
     assert np.float64(3.0) not in Range(whole=True)
 
 
