@@ -334,6 +334,23 @@ def test_an_interrupt_that_is_dropped_ends_the_process() -> None:
     assert process.returncode == 130
 
 
+def test_a_child_that_the_first_look_misses_is_ended_too() -> None:
+    code = (
+        "import subprocess\n"
+        "from mrmg import interruption\n"
+        "child = subprocess.Popen(['sleep', '60'])\n"
+        "print(child.pid, flush=True)\n"
+        "looks = iter([[], [child.pid], []])\n"
+        "interruption._children = lambda process: next(looks)\n"
+        "interruption.end()\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 130
+    assert not Path(f"/proc/{int(ended.stdout)}").exists()
+
+
 def test_an_interrupt_that_compiled_code_prints_ends_the_process() -> None:
     code = (
         "import sys\n"
