@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from math import hypot, pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -171,6 +172,18 @@ def test_energy_decides_to_the_metre_on_a_straight_lane(
     assert (proof is not None) is provable
     if proof is not None:
         assert "far" in proof
+
+
+def test_what_consumers_draw_on_the_way_is_energy_too(yard: MakeScene) -> None:
+    """With half as much again as the ground takes, a battery reaches two thirds."""
+    for capacity_m, provable in ((1.5 * 110.0, True), (1.5 * 112.0, False)):
+        scene = long_scene(yard, capacity_m, [])
+        (robot,) = scene.robots
+        plain_J_per_m = robot.model.energy_model.plain_ground_J_per_m()
+        drawn_W = 0.5 * plain_J_per_m * robot.model.top_speed_m_s
+        model = replace(robot.model, idle_power_W=drawn_W)
+        drawing = replace(scene, robots=(replace(robot, model=model),))
+        assert (proof_of_infeasibility(drawing) is not None) is provable
 
 
 def test_the_missing_energy_is_that_of_the_missing_way(yard: MakeScene) -> None:

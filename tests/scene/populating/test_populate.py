@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import shutil
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,9 @@ from mrmg.scene.loading.models import model_folder
 from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.populate import populate
+from mrmg.scene.robot_figures import figure_lines
 from mrmg.scene.types import Scene
+from mrmg.shipped import models_folder
 
 MAPS = Path(__file__).parents[4] / "shared" / "maps"
 FLEET_MAPS = (
@@ -145,6 +149,25 @@ def test_large_fleet() -> None:
 def test_seeds_differ() -> None:
     scenes = [placed(FIELD, goals=6, stations=3, seed=seed) for seed in range(3)]
     assert len({scene.digest for scene in scenes}) == 3
+
+
+def test_batteries_feed_what_consumers_draw_on_the_way(tmp_path: Path) -> None:
+    folder = tmp_path / "own"
+    shutil.copytree(models_folder() / "car", folder)
+    stated = (folder / "robot.yaml").read_text()
+    drawing = re.sub("(?m)^idle_power: .*$", "idle_power: 100.0", stated)
+    (folder / "robot.yaml").write_text(drawing)
+    quickstart = load_scene("quickstart")
+    plain, own = populate(quickstart), populate(quickstart, model=str(folder))
+    model = own.robots[0].model
+    top_m_s = model.planning_share * model.limits.v_max_m_s
+    share = 1.0 + 100.0 / (model.energy_model.plain_ground_J_per_m() * top_m_s)
+    ratio = own.robots[0].battery.capacity_J / plain.robots[0].battery.capacity_J
+    assert ratio == pytest.approx(share, abs=0.01)
+    reach = next(line for line in figure_lines(model) if line.startswith("battery"))
+    plain_J = model.energy_model.plain_ground_J_per_m()
+    least_m = model.battery_capacity_J / (plain_J * share)
+    assert f", {least_m:.0f} m with what its consumers draw at top speed" in reach
 
 
 def test_map_is_kept_and_mission_replaced() -> None:
