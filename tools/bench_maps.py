@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import bench
@@ -22,7 +23,7 @@ from mrmg.errors import UsageError
 from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating.populate import populate
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "maps"
 
@@ -39,8 +40,9 @@ def main() -> int:
     if missing:
         print(f"no map {', '.join(missing)}; name others", file=sys.stderr)
         return 2
-    print(f"{__doc__}\n{options.robots} robots, {options.goals} goals, "
-          f"placement {options.placement}\n\n{bench.protocol(options)}")  # fmt: skip
+    mission = f"{options.robots} robots, {options.goals} goals"
+    mission += f", placement {options.placement}, idle power {options.idle_power:g} W"
+    print(f"{__doc__}\n{mission}\n\n{bench.protocol(options)}")
     scenes = ((str(path), populated(path, options)) for path in options.maps)
     return bench.plan_each(scenes, options, "bench_maps")
 
@@ -52,6 +54,9 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--robots", type=int, default=4, help="default 4")
     parser.add_argument("--goals", type=int, default=20, help="default 20")
     parser.add_argument("--placement", type=int, default=3, help="its seed, default 3")
+    power = {"type": float, "default": 0.0, "metavar": "W"}
+    more = "of each robot, default 0; batteries hold what it takes on the way, too"
+    parser.add_argument("--idle-power", **power, help=more)
     bench.add_mission_options(parser, seeds="0-19")
     return parser.parse_args()
 
@@ -59,7 +64,7 @@ def parse_options() -> argparse.Namespace:
 def populated(path: Path, options: argparse.Namespace) -> Scene:
     """Return the scene of a map."""
     try:
-        return populate(
+        scene = populate(
             scene_from_document(import_files([path]).document, source=str(path)),
             robots=options.robots,
             goals=options.goals,
@@ -67,6 +72,17 @@ def populated(path: Path, options: argparse.Namespace) -> Scene:
         )
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
+    robots = tuple(drawing(robot, options.idle_power) for robot in scene.robots)
+    return replace(scene, robots=robots)
+
+
+def drawing(robot: Robot, idle_power_W: float) -> Robot:
+    """Return a robot whose own consumers draw so much."""
+    model = replace(robot.model, idle_power_W=idle_power_W)
+    more = 1.0 + model.consumed_per_m(model.planned_limits.v_max_m_s)
+    full_J, start_J = more * robot.battery.capacity_J, more * robot.battery.start_J
+    battery = replace(robot.battery, capacity_J=full_J, start_J=start_J)
+    return replace(robot, model=model, battery=battery)
 
 
 if __name__ == "__main__":

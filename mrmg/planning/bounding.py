@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +13,11 @@ from mrmg.background import in_background
 from mrmg.planning.bound.bound import CELLS, FINER, ROUNDS, lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.consumers import without_consumers
 from mrmg.planning.halting import NEVER, Halted
+from mrmg.planning.preference import Preference
 from mrmg.planning.statistics import Bounds, Statistics
+from mrmg.scene.objective import ENERGY
 from mrmg.scene.types import Scene
 
 COARSE_CELLS = 1000
@@ -44,9 +48,11 @@ def bounds_of(
     """
     objective, limit_s = scene.objective, scene.time_limit_s
     energy_J = makespan_s = blend = divisions = None
-    timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
+    driving = Preference.of(scene).driving
+    timed = driving.makespan_weight > 0.0 or math.isfinite(limit_s)
     if objective.energy_weight and timed:
-        divisions = Divisions.of(scene, step_s=step_s, cells=cells, halt=halt)
+        bare = without_consumers(scene)
+        divisions = Divisions.of(bare, step_s=step_s, cells=cells, halt=halt)
     if objective.makespan_weight and divisions is not None:
         makespan_s = divisions.makespan_s
     elif objective.makespan_weight:
@@ -56,9 +62,10 @@ def bounds_of(
             scene, step_s=step_s, cells=cells, rounds=rounds, finer=finer, halt=halt
         )
         if divisions is not None:
-            energy_J = max(energy_J, divisions.energy_within_J(limit_s))
+            energy = Preference.of(replace(scene, objective=ENERGY)).driving
+            energy_J = max(energy_J, divisions.value(energy, limit_s))
             if objective.makespan_weight:
-                blend = divisions.value(objective, limit_s)
+                blend = divisions.value(driving, limit_s)
     return Bounds(energy_J=energy_J, makespan_s=makespan_s, blend=blend)
 
 

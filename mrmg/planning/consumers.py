@@ -1,10 +1,19 @@
-"""What robots' consumers draw on their ways, as if the ground took it."""
+"""Missions whose ground takes what robots' consumers draw, or that do without them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from mrmg.scene.types import Scene
+
+
+def without_consumers(scene: Scene) -> Scene:
+    """Return a mission whose robots' consumers draw nothing."""
+    robots = [
+        replace(one, model=replace(one.model, idle_power_W=0.0, device_power_W=0.0))
+        for one in scene.robots
+    ]
+    return replace(scene, robots=tuple(robots))
 
 
 def with_consumers_as_ground(scene: Scene) -> Scene:

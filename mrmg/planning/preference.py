@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mrmg.plans import Plan
 from mrmg.scene.objective import ENERGY, Objective, overtime_s
@@ -20,22 +20,36 @@ class Preference:
     Attributes:
         objective: what is to be small.
         limit_s: longest makespan that is planned; inf for any.
+        consumers_W: what consumers of the whole fleet draw until the mission is over.
     """
 
     objective: Objective = ENERGY
     limit_s: float = math.inf
+    consumers_W: float = 0.0
 
     @staticmethod
     def of(scene: Scene) -> Preference:
         """Return the preference of a scene, with room for execution to be late."""
         return Preference(
-            objective=scene.objective, limit_s=scene.time_limit_s - TIME_MARGIN_S
+            objective=scene.objective,
+            limit_s=scene.time_limit_s - TIME_MARGIN_S,
+            consumers_W=sum(robot.model.consumers_W for robot in scene.robots),
         )
+
+    @property
+    def driving(self) -> Objective:
+        """The objective in terms of the energy of driving alone, and of time.
+
+        Consumers draw, in all robots, for as long as the mission takes.
+        """
+        own = self.objective
+        drawn = own.energy_weight * self.consumers_W
+        return replace(own, makespan_weight=own.makespan_weight + drawn)
 
     @property
     def timed(self) -> bool:
         """Whether it matters at all how long anything takes."""
-        return self.objective.makespan_weight > 0.0 or math.isfinite(self.limit_s)
+        return self.driving.makespan_weight > 0.0 or math.isfinite(self.limit_s)
 
     def late_s(self, plan: Plan) -> float:
         """Return how much later than planned for a plan is over; 0 if it is not."""

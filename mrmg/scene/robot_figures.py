@@ -60,7 +60,7 @@ def figure_lines(model: RobotModel) -> list[str]:
     driven = f"driven by {found['mjcf']}, which agrees with robot.yaml"
     if reason is not None:
         driven = f"has {reason}: can be planned for, but not driven"
-    consumed = model.consumed_per_m(share * limits.v_max_m_s)
+    consumed = model.consumed_per_m(model.planned_limits.v_max_m_s)
     with_consumers = ""
     if consumed > 0.0:
         least_m = found["battery_range_m"] / (1.0 + consumed)

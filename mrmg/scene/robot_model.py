@@ -224,11 +224,20 @@ class RobotModel(ByContent):
         """Speed that the robot exceeds in neither direction."""
         return max(self.limits.v_max_m_s, -self.limits.v_min_m_s)
 
+    @property
+    def planned_limits(self) -> Limits:
+        """The share of the limits that plans use."""
+        return self.limits.scaled(self.planning_share)
+
+    @property
+    def consumers_W(self) -> float:
+        """Power that consumers draw at all times."""
+        return self.energy_model.idle_power_W + self.energy_model.device_power_W
+
     def consumed_per_m(self, speed_m_s: float) -> float:
         """Return what consumers draw on a metre at a speed [m of plain ground]."""
-        energy = self.energy_model
-        power_W = energy.idle_power_W + energy.device_power_W
-        return power_W / (energy.plain_ground_J_per_m() * speed_m_s)
+        plain_J_per_m = self.energy_model.plain_ground_J_per_m()
+        return self.consumers_W / (plain_J_per_m * speed_m_s)
 
     @property
     def top_kinetic_J(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
@@ -61,3 +61,14 @@ def test_planning_leaves_time_for_execution(yard: Any) -> None:
     assert preference.timed
     assert not Preference.of(yard()).timed
     assert Preference.of(yard(objective="makespan")).timed
+
+
+def test_what_the_whole_fleet_draws_is_a_price_of_time(yard: Any) -> None:
+    (robot,) = yard().robots
+    model = replace(robot.model, idle_power_W=60.0, device_power_W=20.0)
+    fleet = (replace(robot, model=model), replace(robot, id="r2", model=model), robot)
+    blend = Objective(energy_weight=2.0, makespan_weight=5.0)
+    preference = Preference.of(replace(yard(), robots=fleet, objective=blend))
+    assert preference.driving == Objective(energy_weight=2.0, makespan_weight=325.0)
+    assert preference.objective == blend
+    assert Preference.of(replace(yard(), robots=fleet)).timed

@@ -85,6 +85,8 @@ class Divisions:
 
     def value(self, objective: Objective, limit_s: float = math.inf) -> float:
         """Return a value of an objective that no plan undercuts within a limit."""
+        if not objective.makespan_weight:
+            return objective.value(self.energy_within_J(limit_s), 0.0)
         times_s = np.unique(self.time_s[self.time_s <= limit_s])
         least = math.inf
         for level_s in np.array_split(times_s, min(LEVELS, len(times_s))):

@@ -7,7 +7,7 @@ than batteries have are found anew for what driving took.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,12 +20,31 @@ Leg = tuple[int, int, int]
 """Indices of a leg in `RoutingArrays.cost`: table, place and target."""
 
 
-def legs_driven_J(
+@dataclass(slots=True)
+class Driven:
+    """What driving took.
+
+    Attributes:
+        leg_J: energies of legs that were driven to their ends.
+        rest_J: what each robot's consumers drew from when it had come to rest until the
+            mission was over.
+    """
+
+    leg_J: dict[Leg, float] = field(default_factory=dict)
+    rest_J: dict[int, float] = field(default_factory=dict)
+
+    def update(self, later: Driven) -> None:
+        """Take over what later driving took."""
+        self.leg_J.update(later.leg_J)
+        self.rest_J.update(later.rest_J)
+
+
+def what_driving_took(
     problem: Problem,
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
-) -> dict[Leg, float]:
-    """Return the energy of each leg that was driven to its end [J].
+) -> Driven:
+    """Return what driving tours took.
 
     Args:
         problem: the mission.
@@ -34,26 +53,32 @@ def legs_driven_J(
     """
     routing = problem.mission.routing
     number = {target.id: t for t, target in enumerate(problem.scene.targets())}
-    leg_J: dict[Leg, float] = {}
+    driven = Driven()
     for r, trajectory in enumerate(trajectories):
         tour = tours[trajectory.robot]
         visits, _, entries = visits_and_energy(problem.scene, trajectory, tour)
         places = [int(routing.home[r]), *(number[visit.target] for visit in visits)]
         for leg, (place, target) in enumerate(pairwise(places)):
             drawn_J = sum(entry.energy_J for entry in entries if entry.leg == leg)
-            leg_J[int(routing.table[r]), place, target] = drawn_J
-    return leg_J
+            driven.leg_J[int(routing.table[r]), place, target] = drawn_J
+        moving = np.flatnonzero((np.diff(trajectory.state, axis=0) != 0.0).any(axis=1))
+        resting = len(trajectory.control) - (moving[-1] + 1 if len(moving) else 0)
+        power_W = problem.scene.robots[r].model.consumers_W
+        driven.rest_J[r] = power_W * trajectory.dt_s * float(resting)
+    return driven
 
 
-def with_driven_legs(problem: Problem, leg_J: Mapping[Leg, float]) -> Problem:
+def with_driven_legs(problem: Problem, driven: Driven) -> Problem:
     """Return the problem whose legs take what driving them took.
 
-    Those that were not driven take as much more, or less, as all that were.
+    Those that were not driven take as much more, or less, as all that were. What robots
+    took while they stood at the end counts as if they drove on to a finish.
 
     Args:
         problem: the mission.
-        leg_J: energies of some legs [J].
+        driven: what driving some tours took.
     """
+    leg_J = driven.leg_J
     if not leg_J:
         return problem
     problem = problem.with_margin(0.0)
@@ -63,7 +88,8 @@ def with_driven_legs(problem: Problem, leg_J: Mapping[Leg, float]) -> Problem:
     share = max(1e-9, driven_J.sum()) / max(1e-9, routing.cost[at].sum())
     cost = share * routing.cost
     cost[at] = driven_J
-    routing = routing._replace(
-        cost=cost, escape=share * routing.escape, finish=share * routing.finish
-    )
+    finish = share * routing.finish
+    for r, rest_J in driven.rest_J.items():
+        finish[r] += rest_J
+    routing = routing._replace(cost=cost, escape=share * routing.escape, finish=finish)
     return replace(problem, mission=problem.mission._replace(routing=routing))

@@ -9,7 +9,7 @@ Where robots get in each other's way, a search for motions starts from the paths
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import radians
 
@@ -28,12 +28,13 @@ from mrmg.planning.path_following.band import (
 )
 from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
-from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
+from mrmg.planning.path_following.driven_legs import Driven, what_driving_took
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import whole_tours
+from mrmg.planning.problem.time_weighting import time_counts
 from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 
@@ -68,14 +69,14 @@ class Followed:
         failure: why there is none, in words.
         driven: whether they could be driven, if not on the charge there is.
         led: whether a path led any robot.
-        leg_J: energies of the legs that were driven, if that gave no plan.
+        took: what driving took, if that gave no plan.
     """
 
     plan: Plan | None
     failure: str = ""
     driven: bool = True
     led: bool = True
-    leg_J: Mapping[Leg, float] = field(default_factory=dict)
+    took: Driven = field(default_factory=Driven)
 
 
 def follow_tours(
@@ -97,7 +98,7 @@ def follow_tours(
     cost_maps, first = cost_maps_of(problem), request.number == 0
     stops = whole_tours(problem.mission.targets, routing.tours)
     tours = problem.visits(routing.tours)
-    timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
+    timed = problem.minimum_time or time_counts(problem.scene)
     tasks = []
     for r, (tour, cost_map) in enumerate(zip(stops, cost_maps, strict=True)):
         # The search for motions nearly always finds the shortest curve to a single
@@ -115,9 +116,8 @@ def follow_tours(
     )
     if plan is not None:
         return Followed(plan)
-    return Followed(
-        None, refusal, leg_J=legs_driven_J(problem, drive.trajectories, tours)
-    )
+    took = what_driving_took(problem, drive.trajectories, tours)
+    return Followed(None, refusal, took=took)
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:

@@ -236,7 +236,7 @@ def cost_maps_of(problem: Problem) -> list[CostMap]:
     turning_m = np.where(fleet["model"] == UNICYCLE, top / rate, 0.0)
     cost_maps = []
     for r, robot in enumerate(problem.scene.robots):
-        share = energy_share(problem.scene.objective, robot)
+        share = energy_share(problem.preference.driving, robot)
         cost_map = cost_map_of(problem, r, smooth)
         if share < 1.0:
             worth = share * cost_map.multiplier + (1.0 - share)

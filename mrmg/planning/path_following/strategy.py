@@ -20,7 +20,7 @@ from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import rounds_of
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.draws import Draw, Tours, drawn_tours, tours_of
-from mrmg.planning.path_following.driven_legs import Leg, with_driven_legs
+from mrmg.planning.path_following.driven_legs import Driven, with_driven_legs
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
@@ -29,6 +29,7 @@ from mrmg.planning.path_following.following import (
 from mrmg.planning.path_following.refine import ROBOTS_MEET, along_trajectories, refine
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import whole_tours
+from mrmg.planning.problem.time_weighting import time_counts
 from mrmg.plans import Plan
 
 TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
@@ -68,8 +69,9 @@ class Schedule:
     @staticmethod
     def of(problem: Problem, params: PlannerParams, number: int) -> Schedule:
         """Return the schedule of attempt `number`."""
-        timed = problem.preference.objective.makespan_weight > 0.0
-        alone = number == 0 or problem.preference.timed
+        timed = time_counts(problem.scene)
+        limited = np.isfinite(problem.preference.limit_s)
+        alone = number == 0 or timed or limited
         first = number * DRAWS_PER_ATTEMPT
         numbers = range(first, first + (1 if alone else DRAWS_PER_ATTEMPT))
         draws = tuple(Draw.of(one, timed) for one in numbers)
@@ -95,13 +97,13 @@ class Learnt:
         useless: least state-of-charge margin at which tours are of no use.
         met: whether robots got in each other's way so that no motions were found.
         searched: whether these were searched for without any path.
-        leg_J: energies of legs as they were driven.
+        took: what driving took.
     """
 
     useless: dict[Tours, float] = field(default_factory=dict)
     met: bool = False
     searched: bool = False
-    leg_J: dict[Leg, float] = field(default_factory=dict)
+    took: Driven = field(default_factory=Driven)
 
 
 def follows(problem: Problem, params: PlannerParams) -> bool:
@@ -151,7 +153,7 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
     """
     learnt = Learnt()
     for soc_margin, draws in schedule.followed:
-        kept = with_driven_legs(problem.with_soc_margin(soc_margin), learnt.leg_J)
+        kept = with_driven_legs(problem.with_soc_margin(soc_margin), learnt.took)
         yield follow_paths(kept, request, draws, soc_margin, learnt)
     for soc_margin in (request.params.soc_margin, 0.0):  # until there are tours
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
@@ -250,7 +252,7 @@ def follow_paths(
         learnt.searched |= learnt.met and not followed.led
         learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
-        learnt.leg_J.update(followed.leg_J)
+        learnt.took.update(followed.took)
         if plan is not None and (
             not plans or preference.rank(plan) < preference.rank(plans[-1])
         ):

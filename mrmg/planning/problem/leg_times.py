@@ -60,7 +60,7 @@ def routing_times(
         time[table[r], :places], time[table[r], home[r]] = legs[:-1], legs[-1]
         if finish >= 0:
             finish_time[r] = pace[r] * to[finish, here]
-    objective = preference.objective
+    objective = preference.driving
     power_W = float((fleet["plain"] * fleet["limit"][:, 1]).mean())
     energy_weight = max(
         objective.energy_weight, TIE_SHARE * objective.makespan_weight / power_W

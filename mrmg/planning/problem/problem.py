@@ -199,9 +199,6 @@ def state_problem(
     places = len(scene.targets())
     targets = target_arrays(scene)
     dwell_s = targets.target["dwell"]
-    # What robots draw while they stay counts as way.
-    idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
-    stay_m = idle_m[:, None] * dwell_s[:places]
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     table = tables_of(fleet)
     owner = np.unique(table, return_index=True)[1]
@@ -216,15 +213,15 @@ def state_problem(
         zones=gate_arrays(scene),
         routing=RoutingInstance(
             goals=len(scene.goals),
-            distance=roadmap.distance[fleet["field"][owner], :places, :places]
-            + stay_m[owner, None],
-            start_distance=roadmap.start_distance[:, :places] + stay_m,
+            distance=roadmap.distance[fleet["field"][owner], :places, :places],
+            start_distance=roadmap.start_distance[:, :places],
             plain=fleet["plain"] * (1.0 + params.route_margin),
             table=table,
             energy=energy,
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
             finish_distance=_last_legs(scene, roadmap, fleet),
+            consumers=fleet["energy"][:, CONSUMERS_W],
             **routing_times(scene, roadmap, fleet, table, dwell_s, params.route_margin),
         ).arrays,
     )

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.fleet import travel_classes
 from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs
 from mrmg.scene.margins import Margins
@@ -17,18 +18,35 @@ from mrmg.scene.objective import Objective
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
 
+TIMED_SHARE = 0.9
+"""Share of driving in the worth of ways below which their duration counts, too."""
+
 
 def energy_share(objective: Objective, robot: Robot) -> float:
-    """Return the share of energy in what a plain metre at top speed is worth.
+    """Return the share of driving in what a plain metre at top speed is worth.
 
     The rest is the time it takes. It is 1 where only energy counts, 0 where only the
     makespan does.
+
+    Args:
+        objective: in terms of the energy of driving (`Preference.driving`).
+        robot: the robot.
     """
     model = robot.model
-    top_m_s = model.limits.scaled(model.planning_share).v_max_m_s
+    top_m_s = model.planned_limits.v_max_m_s
     power_W = model.energy_model.plain_ground_J_per_m() * top_m_s
     energy = objective.energy_weight * power_W
     return energy / (energy + objective.makespan_weight)
+
+
+def time_counts(scene: Scene) -> bool:
+    """Return whether time is worth so much that ways are chosen by how fast they are.
+
+    Where it is worth less, a slow manoeuvre that saves a little way pays.
+    """
+    driving = Preference.of(scene).driving
+    shares = [energy_share(driving, robot) for robot in scene.robots]
+    return float(np.mean(shares)) < TIMED_SHARE
 
 
 def brakes_hard(scene: Scene, r: int) -> bool:
@@ -36,7 +54,7 @@ def brakes_hard(scene: Scene, r: int) -> bool:
 
     Rolling saves the power of driving for as long as it takes longer.
     """
-    return energy_share(scene.objective, scene.robots[r]) < 0.5
+    return energy_share(Preference.of(scene).driving, scene.robots[r]) < 0.5
 
 
 def priced_world(scene: Scene, world: World) -> World:
@@ -45,7 +63,8 @@ def priced_world(scene: Scene, world: World) -> World:
     It is the world itself where only energy counts, and on slopes, where ways are what
     energy makes them.
     """
-    shares = [energy_share(scene.objective, robot) for robot in scene.robots]
+    driving = Preference.of(scene).driving
+    shares = [energy_share(driving, robot) for robot in scene.robots]
     share = float(np.mean(shares))
     if share == 1.0 or scene.elevation is not None:
         return world

@@ -27,6 +27,7 @@ class RoutingInstance:
         time: from place to target with the dwell there [s], as `cost`; 0 if None.
         finish_time: from there to the finish [s], shape (R, T + 1); 0 if None.
         limit: longest time of each robot's route [s], shape (R,); none if None.
+        consumers: what each robot draws at all times [W], shape (R,); nothing if None.
         charge_power: of stations for each battery [W], shape (R,); at once if None.
         energy_weight: of the summed energy in the objective.
         makespan_weight: of the longest time of a route in the objective [J/s].
@@ -44,6 +45,7 @@ class RoutingInstance:
     time: np.ndarray | None = None
     finish_time: np.ndarray | None = None
     limit: np.ndarray | None = None
+    consumers: np.ndarray | None = None
     charge_power: np.ndarray | None = None
     energy_weight: float = 1.0
     makespan_weight: float = 0.0
@@ -53,9 +55,15 @@ class RoutingInstance:
         """The problem as kernels take it."""
         robots, targets = self.start_distance.shape
         table = np.arange(robots) if self.table is None else self.table
+        consumers = _filled(self.consumers, 0.0, (robots,))
         cost = self._costs(table)
+        time = _filled(self.time, 0.0, cost.shape)
+        owner = np.unique(table, return_index=True)[1]
+        cost += _drawn_J(consumers[owner, None, None], time)
         finish = _filled(self.finish_distance, 0.0, (robots, targets + 1))
+        finish_time = _filled(self.finish_time, 0.0, finish.shape)
         finish = finish * self.plain[:, None]
+        finish += _drawn_J(consumers[:, None], finish_time)
         return RoutingArrays(
             goals=self.goals,
             cost=cost,
@@ -65,8 +73,8 @@ class RoutingInstance:
             escape=_escape(cost[:, :targets, self.goals :], table, finish),
             open_goal=np.ones(self.goals, bool),
             finish=finish,
-            time=_filled(self.time, 0.0, cost.shape),
-            finish_time=_filled(self.finish_time, 0.0, finish.shape),
+            time=time,
+            finish_time=finish_time,
             limit=_filled(self.limit, np.inf, (robots,)),
             charge_power=_filled(self.charge_power, np.inf, (robots,)),
             energy_weight=float(self.energy_weight),
@@ -100,6 +108,11 @@ def _escape(
     nearest = np.asarray(to_station.min(axis=2))[table]
     closed = finish.any(axis=1, keepdims=True)
     return np.asarray(np.where(closed, np.minimum(nearest, finish[:, :-1]), nearest))
+
+
+def _drawn_J(power_W: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return what consumers draw on legs [J]; where there is no way, nothing."""
+    return np.asarray(power_W * np.where(np.isfinite(time), time, 0.0))
 
 
 def _filled(

@@ -154,7 +154,7 @@ def traction_faults(
     model: RobotModel, robot: CompiledRobot, parts: DrivenParts
 ) -> Iterator[Fault]:
     """Yield what keeps the drive from the acceleration that plans use."""
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     energy = model.energy_model
     most_N = model.usable_grip * model.mass_kg * GRAVITY_M_S2
     needed_N = model.effective_mass_kg * limits.u1_max_m_s2 + energy.rolling_force_N

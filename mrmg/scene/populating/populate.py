@@ -217,7 +217,7 @@ def _mission(
             for k, p in enumerate(chosen, start=1)
         ]
 
-    top_m_s = robot_model.planning_share * robot_model.limits.v_max_m_s
+    top_m_s = robot_model.planned_limits.v_max_m_s
     capacity_m = placement.capacity_m * (1.0 + robot_model.consumed_per_m(top_m_s))
     return {
         "goals": regions("g", placement.goals, GOAL_RADIUS_M),

@@ -79,7 +79,7 @@ class Manoeuvre:
 
 def manoeuvres_of(model: RobotModel) -> tuple[Manoeuvre, ...]:
     """Return everything a robot of `model` drives to be calibrated."""
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     straights = [
         _straight(limits, share * limits.v_max_m_s, multiplier)
         for multiplier in MULTIPLIERS

@@ -367,33 +367,3 @@ def test_no_plan_of_a_shipped_scene_undercuts_the_bound(name: str) -> None:
     costs = [plan.cost_J for plan in plans if plan is not None]
     assert costs
     assert 0.4 * min(costs) <= bound <= min(costs)
-
-
-def drawing(scene: Scene, idle_power_W: float) -> Scene:
-    """Return a scene whose robots' own consumers draw so much."""
-    robots = tuple(
-        replace(one, model=replace(one.model, idle_power_W=idle_power_W))
-        for one in scene.robots
-    )
-    return replace(scene, robots=robots)
-
-
-def test_what_consumers_draw_at_top_speed_is_in_the_bound(
-    yard: Callable[..., Scene],
-) -> None:
-    """On plain ground that is c times what the ground takes, in every way."""
-    scene = yard(battery={"capacity_m": 500})
-    model = scene.robots[0].model
-    power_W = 0.5 * model.energy_model.plain_ground_J_per_m() * model.top_speed_m_s
-    bound_J = lower_bound_J(scene)
-    assert bound_J > 0.0
-    assert lower_bound_J(drawing(scene, power_W)) == pytest.approx(1.5 * bound_J)
-
-
-@pytest.mark.parametrize("idle_power_W", [30.0, 90.0])
-def test_plans_with_consumers_take_more_than_their_bound(idle_power_W: float) -> None:
-    scene = drawing(load_scene("scene2"), idle_power_W)
-    free_J = lower_bound_J(load_scene("scene2"))
-    plan = plan_mission(scene).plan
-    assert plan is not None
-    assert free_J < lower_bound_J(scene) < plan.cost_J

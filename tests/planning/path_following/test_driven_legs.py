@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.planning import PlannerParams
-from mrmg.planning.path_following.driven_legs import with_driven_legs
+from mrmg.planning.path_following.driven_legs import Driven, with_driven_legs
 from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.loading import scene_from_document
 
@@ -30,9 +30,11 @@ def test_driven_legs_have_no_route_margin() -> None:
     problem = state_mission(scene, 0, PlannerParams(route_margin=0.08))
     plain = problem.with_margin(0.0).mission.routing
     home, twice_J = int(plain.home[0]), 2.0 * plain.cost[0, plain.home[0], 0]
-    driven = with_driven_legs(problem, {(0, home, 0): twice_J})
+    took = Driven(leg_J={(0, home, 0): twice_J}, rest_J={0: 70.0})
+    driven = with_driven_legs(problem, took)
     again = driven.with_margin(0.0).mission.routing
     assert np.isclose(again.cost[0, home, 0], twice_J)
     assert np.allclose(again.cost[0, 0, 1], 2.0 * plain.cost[0, 0, 1])
+    assert np.allclose(again.finish, 2.0 * plain.finish + 70.0)
     assert np.allclose(again.time, plain.time)
     assert np.allclose(again.finish_time, plain.finish_time)
