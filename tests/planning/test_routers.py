@@ -54,13 +54,13 @@ def made(**arguments: Any) -> RoutingProblem:
 def driven(
     problem: RoutingProblem, robot: int, tour: Sequence[int]
 ) -> tuple[float, float, bool]:
-    """Return (energy, time, whether it can be driven) of a tour and its finish."""
+    """Return (energy of driving, time, whether it can be) of a tour and its finish."""
     ledger = tour_ledger(problem, robot, tour)
     moves = len(tour) > 0 or ledger.energy_J > 0.0
     reserve_J = problem.reserve_J[robot] * (1.0 - SLACK)
     in_time = ledger.time_s <= problem.time_limit_s[robot] * (1.0 + SLACK)
     fine = in_time and (not moves or ledger.least_J >= reserve_J)
-    return ledger.energy_J, ledger.time_s, bool(fine)
+    return ledger.driving_J, ledger.time_s, bool(fine)
 
 
 def objective(problem: RoutingProblem, tours: Sequence[Sequence[int]]) -> float:
@@ -129,7 +129,8 @@ def renamed(
     node = np.r_[target, problem.targets]
     of_robot = ("start_energy_J", "capacity_J", "reserve_J", "time_limit_s")
     changed = {
-        name: getattr(problem, name)[robot] for name in (*of_robot, "charging_power_W")
+        name: getattr(problem, name)[robot]
+        for name in (*of_robot, "charging_power_W", "consumers_W")
     }
     for name in ("leg_energy_J", "leg_time_s"):
         changed[name] = getattr(problem, name)[np.ix_(robot, node, target)]
@@ -187,6 +188,12 @@ def test_an_unknown_router_is_refused_by_name() -> None:
         {"range_m": (110.0, 160.0), "limit": np.full(2, 130.0), "stations": 2},
         {"makespan_weight": 1.0, "energy_weight": 0.0},
         {"makespan_weight": 2.0, "charge_power": np.full(2, 4.0), "closed": True},
+        {"makespan_weight": 3.0, "consumers": np.array([0.5, 2.5])},
+        {
+            "makespan_weight": 9.0,
+            "consumers": np.full(2, 2.0),
+            "range_m": (200.0, 300.0),
+        },
     ],
     ids=lambda options: "-".join(options),
 )

@@ -166,6 +166,6 @@ def with_endless_batteries(problem: RoutingArrays) -> RoutingArrays:
 def of_robot(problem: RoutingArrays, r: int) -> RoutingArrays:
     """Return the mission of one robot of a fleet alone."""
     names = ("cost", "energy", "capacity", "reserve", "escape", "finish")
-    timed = ("time", "finish_time", "limit", "charge_power")
+    timed = ("time", "finish_time", "limit", "charge_power", "consumers")
     own = {name: getattr(problem, name)[r : r + 1] for name in names + timed}
     return problem._replace(**own)

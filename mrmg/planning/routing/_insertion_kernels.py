@@ -18,6 +18,7 @@ from mrmg.planning.routing._refuel_kernels import (
     WAYS,
     battery_of,
     extend,
+    leg_of,
     route_value,
     slot_of,
 )
@@ -37,16 +38,16 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     """
     at, own, battery = len(labels.head) - 1, legs.table[r], battery_of(legs, r)
     row, place = behind
-    leg = legs.cost[own, before[1], goal], legs.time[own, before[1], goal]
+    leg = leg_of(legs, own, before[1], goal)
     slot = slot_of(legs, labels, own, before[1], goal)
     rows, stops = (before[0], at), (slot, labels.paths[slot], 0)
     extend(labels.way, labels.head, rows, leg, labels.path, stops, battery)
-    leg = legs.cost[own, goal, place], legs.time[own, goal, place]
+    leg = leg_of(legs, own, goal, place)
     slot = slot_of(legs, labels, own, goal, place)
     most = legs.robot[r, LIMIT] * (1.0 + ROUNDING)
     best = ceiling
     for j in range(-1, labels.paths[slot]):
-        hop = leg[0], leg[1], leg[0], -1.0
+        hop = leg[0], leg[1], leg[2], -1.0
         if j >= 0:
             path = labels.path[slot, j]
             hop = path[COST], path[TIME], path[TO], path[ON]

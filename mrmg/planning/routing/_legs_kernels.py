@@ -33,6 +33,7 @@ class Legs(NamedTuple):
         table: of each robot, shape (R,).
         home: each robot's place in its table, shape (R,).
         cost, time: from place to place [J], [s], shape (tables, P, P).
+        draw: of the battery [J], what consumers draw on the way, too, as `cost`.
         hop, hop_time: from station to station over any others, (tables, S, S).
         follower: next station on that way, shape (tables, S, S).
         near: the nearest stations from each place, and to it, nearest first, shape
@@ -52,6 +53,7 @@ class Legs(NamedTuple):
     home: np.ndarray
     cost: np.ndarray
     time: np.ndarray
+    draw: np.ndarray
     hop: np.ndarray
     hop_time: np.ndarray
     follower: np.ndarray
@@ -72,15 +74,16 @@ def new_legs(problem: RoutingArrays) -> Legs:
     timed = problem.makespan_weight > 0.0 or bool(np.isfinite(problem.limit).any())
     table, home = problem.table, problem.home
     tables, places = problem.cost.shape[:2]
-    cost = np.full((tables, places, places), np.inf)
-    time = np.zeros_like(cost)
-    cost[:, :, :targets], time[:, :, :targets] = problem.cost, problem.time
-    cost[table, :targets, home] = problem.finish[:, :targets]
+    draw = np.full((tables, places, places), np.inf)
+    time = np.zeros_like(draw)
+    draw[:, :, :targets], time[:, :, :targets] = problem.cost, problem.time
+    draw[table, :targets, home] = problem.finish[:, :targets]
     time[table, :targets, home] = problem.finish_time[:, :targets]
-    cost[table, home, home] = problem.finish[:, targets]
+    draw[table, home, home] = problem.finish[:, targets]
     time[table, home, home] = problem.finish_time[:, targets]
     if not timed:
         time[:] = 0.0
+    cost = _driving_J(draw, time, table, problem.consumers)
     robot = np.zeros((robots, 4))
     robot[:, USABLE] = problem.capacity - problem.reserve
     robot[:, MISSING] = problem.capacity - problem.energy
@@ -89,9 +92,10 @@ def new_legs(problem: RoutingArrays) -> Legs:
     one = np.flatnonzero(home == targets)
     between = slice(goals, targets)
     battery = robot[one][:, (USABLE, CHARGE_TIME)]
-    hop, hop_time, follower = _hops(
-        cost[:, between, between], time[:, between, between], battery
+    hop, hop_time, hop_draw = (
+        leg[:, between, between].copy() for leg in (cost, time, draw)
     )
+    follower = _extend_hops(hop, hop_time, hop_draw, battery)
     apart = np.stack([cost[:, :, between], cost[:, between].transpose(0, 2, 1)], axis=2)
     reach = apart.min(axis=3, initial=np.inf)
     near = np.argsort(apart, axis=3, kind="stable")[..., :MOST_NEAR].copy()
@@ -104,6 +108,7 @@ def new_legs(problem: RoutingArrays) -> Legs:
         home,
         cost,
         time,
+        draw,
         hop,
         hop_time,
         follower,
@@ -118,20 +123,34 @@ def new_legs(problem: RoutingArrays) -> Legs:
     )
 
 
-def _hops(
-    leg: np.ndarray, leg_time: np.ndarray, battery: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return cost, time and next station on the ways from station to station.
+def _driving_J(
+    draw: np.ndarray, time: np.ndarray, table: np.ndarray, consumers: np.ndarray
+) -> np.ndarray:
+    """Return the energies of legs without what consumers draw on them."""
+    if not (consumers.any() and time.any()):
+        return draw
+    power_W = consumers[np.unique(table, return_index=True)[1], None, None]
+    there = np.isfinite(draw)
+    driving_J = draw - power_W * np.where(there, time, 0.0)
+    return np.where(there, np.maximum(0.0, driving_J), np.inf)
+
+
+def _extend_hops(
+    hop: np.ndarray, hop_time: np.ndarray, draw: np.ndarray, battery: np.ndarray
+) -> np.ndarray:
+    """Lead ways from station to station over any others; return the next on each.
 
     Args:
-        leg, leg_time: straight from station to station, shape (tables, S, S).
+        hop, hop_time: cost and time of straight ways, shape (tables, S, S); changed to
+            those of the cheapest.
+        draw: of straight ways.
         battery: energy that it holds, and time that recharging takes, (tables, 2).
     """
-    hop, hop_time, stations = leg.copy(), leg_time.copy(), leg.shape[1]
-    hop[:, range(stations), range(stations)] = 0.0
-    hop_time[:, range(stations), range(stations)] = 0.0
-    within = hop <= battery[:, 0, None, None]
-    hop_time += battery[:, 1, None, None] * np.where(within, hop, 0.0)
+    stations = hop.shape[1]
+    for legs in (hop, hop_time, draw):
+        legs[:, range(stations), range(stations)] = 0.0
+    within = draw <= battery[:, 0, None, None]
+    hop_time += battery[:, 1, None, None] * np.where(within, draw, 0.0)
     hop[~within] = np.inf
     follower = np.broadcast_to(np.arange(stations), hop.shape).copy()
     for over in range(stations):
@@ -142,4 +161,4 @@ def _hops(
         hop_time[shorter] = longer[shorter]
         first = np.broadcast_to(follower[:, :, over, None], hop.shape)
         follower[shorter] = first[shorter]
-    return hop, hop_time, follower
+    return follower

@@ -37,8 +37,11 @@ class RoutingArrays(NamedTuple):
         finish_time: from place to finish [s], shape (R, T + 1).
         limit: longest time of a route [s], shape (R,).
         charge_power: at which batteries are filled [W], inf for at once, shape (R,).
-        energy_weight: of the summed energy in the objective.
-        makespan_weight: of the longest time of a route in the objective [J/s].
+        consumers: what is drawn at all times [W], in the energies as long as robots
+            drive, shape (R,).
+        energy_weight: of the summed energy in the objective, without consumers.
+        makespan_weight: of the longest time of a route in the objective [J/s], in it
+            what all consumers draw.
         table: of each robot, among C tables of legs; NRPA wants one for each, shape
             (R,).
         home: each robot's start among the places of its table, shape (R,).
@@ -56,6 +59,7 @@ class RoutingArrays(NamedTuple):
     finish_time: np.ndarray
     limit: np.ndarray
     charge_power: np.ndarray
+    consumers: np.ndarray
     energy_weight: float
     makespan_weight: float
     table: np.ndarray

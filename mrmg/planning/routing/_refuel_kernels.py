@@ -173,16 +173,14 @@ def find_paths(legs, path, slot, own, a, b):
     n = 0
     for i in range(legs.near.shape[3]):
         f = legs.near[own, a, 0, i]
-        to, to_time = (
-            legs.cost[own, a, legs.goals + f],
-            legs.time[own, a, legs.goals + f],
-        )
+        to = legs.draw[own, a, legs.goals + f]
         for j in range(legs.near.shape[3]):
             e = legs.near[own, b, 1, j]
-            on = legs.cost[own, legs.goals + e, b]
-            cost = to + legs.hop[own, f, e] + on
+            on = legs.draw[own, legs.goals + e, b]
+            cost = legs.cost[own, a, legs.goals + f] + legs.hop[own, f, e]
+            cost += legs.cost[own, legs.goals + e, b]
             if cost < np.inf:
-                time = to_time + legs.hop_time[own, f, e]
+                time = legs.time[own, a, legs.goals + f] + legs.hop_time[own, f, e]
                 time += legs.time[own, legs.goals + e, b]
                 n = add_label(path, slot, n, (cost, time, to, on, 1.0 * f, 1.0 * e))
     return n
@@ -195,7 +193,7 @@ def extend(way, head, rows, leg, path, stops, battery):
     Args:
         way, head: all labels.
         rows: of the ways there are, and of those to be written.
-        leg: cost and time from place to place.
+        leg: cost, time and draw from place to place.
         path: all recharging paths.
         stops: slot of those in the direction of driving, their number, and the end
             from which the ways begin.
@@ -206,7 +204,7 @@ def extend(way, head, rows, leg, path, stops, battery):
     slot, paths, end = stops
     n, ways = 0, int(head[row, WAYS])
     for k in range(ways):
-        drawn = way[row, k, DRAW] + leg[0]
+        drawn = way[row, k, DRAW] + leg[2]
         if drawn <= battery[0]:
             cost, late = way[row, k, COST] + leg[0], way[row, k, TIME] + leg[1]
             new = (cost, late, drawn, way[row, k, RATE], 1.0 * k, -1.0)
@@ -230,6 +228,12 @@ def extend(way, head, rows, leg, path, stops, battery):
     head[next_row, WAYS] = n
     head[next_row, LEAST] = way[next_row, cheapest, COST] if n > 0 else np.inf
     head[next_row, LEAST_DRAW] = way[next_row, cheapest, DRAW]
+
+
+@kernel
+def leg_of(legs, own, a, b):
+    """Return cost, time and draw from place to place in a table."""
+    return legs.cost[own, a, b], legs.time[own, a, b], legs.draw[own, a, b]
 
 
 @kernel
@@ -269,10 +273,10 @@ def label_route(legs, labels, r, goal, length, held, plain):
                 if labels.pair[slot] != key:
                     slot_of(legs, labels, own, a, b)
                 paths = labels.paths[slot]
-            leg = legs.cost[own, a, b], legs.time[own, a, b]
+            leg = leg_of(legs, own, a, b)
             rows, stops = (last_row, row), (slot, paths, end)
             extend(labels.way, labels.head, rows, leg, labels.path, stops, battery)
-    if length == 0 and legs.cost[own, home, home] == 0.0:
+    if length == 0 and legs.draw[own, home, home] == 0.0:
         return 0.0, legs.time[own, home, home], -1
     row = row_of(legs, r, goal, length, 0, length + 1)
     best = best_cost = best_time = np.inf

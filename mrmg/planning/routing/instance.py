@@ -29,8 +29,9 @@ class RoutingInstance:
         limit: longest time of each robot's route [s], shape (R,); none if None.
         consumers: what each robot draws at all times [W], shape (R,); nothing if None.
         charge_power: of stations for each battery [W], shape (R,); at once if None.
-        energy_weight: of the summed energy in the objective.
-        makespan_weight: of the longest time of a route in the objective [J/s].
+        energy_weight: of the summed energy in the objective, without consumers.
+        makespan_weight: of the longest time of a route in the objective [J/s], in it
+            what all consumers draw.
     """
 
     goals: int
@@ -77,6 +78,7 @@ class RoutingInstance:
             finish_time=finish_time,
             limit=_filled(self.limit, np.inf, (robots,)),
             charge_power=_filled(self.charge_power, np.inf, (robots,)),
+            consumers=consumers,
             energy_weight=float(self.energy_weight),
             makespan_weight=float(self.makespan_weight),
             table=table,

@@ -7,6 +7,7 @@ recreate with exact placing of the stations, or by nested rollout policy adaptat
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import thread_time
 
@@ -124,7 +125,21 @@ def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Ro
             zip(routes.length[:-1], routes.known[:-1, LABEL], strict=True)
         )
     )
-    return Routing(tours, cost_J if cost_J < IMPOSSIBLE else math.inf)
+    if cost_J >= IMPOSSIBLE:
+        return Routing(tours, math.inf)
+    if problem.consumers.any():  # which the search knows by their time alone
+        cost_J = _energy_J(problem, tours)
+    return Routing(tours, cost_J)
+
+
+def _energy_J(problem: RoutingArrays, tours: Sequence[Sequence[int]]) -> float:
+    """Return the energy of tours with what consumers draw on the way."""
+    total_J, targets = 0.0, problem.cost.shape[2]
+    for r, tour in enumerate(tours):
+        places = [problem.home[r], *tour]
+        total_J += problem.cost[problem.table[r], places[:-1], tour].sum()
+        total_J += problem.finish[r, tour[-1] if tour else targets]
+    return float(total_J)
 
 
 def tour_of(

@@ -42,8 +42,11 @@ class RoutingProblem:
         finish_time_s: from node to the finish, shape (R, T + 1).
         time_limit_s: of each tour with its finish, inf for none, shape (R,).
         charging_power_W: at which batteries are filled, inf for at once, shape (R,).
-        energy_weight: of the fleet's energy in the objective [1/J].
-        makespan_weight: of the longest tour's time in the objective [1/s].
+        consumers_W: what is drawn at all times, in the energies of legs for as long as
+            they take, shape (R,).
+        energy_weight: of the fleet's energy in the objective, without consumers [1/J].
+        makespan_weight: of the longest tour's time in the objective, in it what all
+            consumers draw until then [1/s].
     """
 
     goals: int
@@ -58,6 +61,7 @@ class RoutingProblem:
     finish_time_s: np.ndarray
     time_limit_s: np.ndarray
     charging_power_W: np.ndarray
+    consumers_W: np.ndarray
     energy_weight: float
     makespan_weight: float
 
@@ -99,11 +103,13 @@ class TourLedger:
 
     Attributes:
         energy_J: of all legs, the finish included.
+        driving_J: the same without what consumers draw: what counts in the objective.
         time_s: until its end.
         least_J: least that is left in the battery on the way.
     """
 
     energy_J: float
+    driving_J: float
     time_s: float
     least_J: float
 
@@ -111,7 +117,7 @@ class TourLedger:
 def tour_ledger(problem: RoutingProblem, robot: int, tour: Sequence[int]) -> TourLedger:
     """Return what a tour takes, leg by leg."""
     node, left_J = problem.targets, float(problem.start_energy_J[robot])
-    energy_J, time_s, least_J = 0.0, 0.0, left_J
+    energy_J, time_s, charging_s, least_J = 0.0, 0.0, 0.0, left_J
     for target in tour:
         leg_J = float(problem.leg_energy_J[robot, node, target])
         energy_J, left_J = energy_J + leg_J, left_J - leg_J
@@ -119,12 +125,18 @@ def tour_ledger(problem: RoutingProblem, robot: int, tour: Sequence[int]) -> Tou
         time_s += float(problem.leg_time_s[robot, node, target])
         if target >= problem.goals:
             full_J = float(problem.capacity_J[robot])
-            time_s += (full_J - left_J) / float(problem.charging_power_W[robot])
+            charging_s += (full_J - left_J) / float(problem.charging_power_W[robot])
             left_J = full_J
         node = target
     last_J = float(problem.finish_energy_J[robot, node])
     time_s += float(problem.finish_time_s[robot, node])
-    return TourLedger(energy_J + last_J, time_s, min(least_J, left_J - last_J))
+    energy_J += last_J
+    return TourLedger(
+        energy_J=energy_J,
+        driving_J=energy_J - float(problem.consumers_W[robot]) * time_s,
+        time_s=time_s + charging_s,
+        least_J=min(least_J, left_J - last_J),
+    )
 
 
 def faults_of_tours(problem: RoutingProblem, routing: Routing) -> Iterator[str]:
