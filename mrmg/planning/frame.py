@@ -50,7 +50,7 @@ SEAM_RAD = 0.01
 """Headings lie within a half turn of this, so that 3.1416 stays what it is."""
 
 
-ORDINARY_M = (0.15, 2.0)
+ORDINARY_M = (0.5, 2.0)
 """Radii of circles about robots for which a metre is the unit: of the fleet's the
 geometric mean counts."""
 
@@ -58,7 +58,7 @@ USUAL_M = 0.8
 """Radius that the others have in theirs, but for a power of two: so nothing is rounded
 differently."""
 
-MOST_AREA = 2.5e5
+MOST_AREA = 1e5
 """Area of the map in squares of a unit smaller than a metre, at most: it bounds the
 cells of grids."""
 
