@@ -101,7 +101,11 @@ class RouterContract:
                 "charge_power": np.full(2, 4.0),
             },
             "makespan": {"makespan_weight": 1.0, "charge_power": np.full(2, 4.0)},
-            "consumers": {"makespan_weight": 3.0, "consumers": np.full(2, 1.5)},
+            "consumers": {
+                "makespan_weight": 3.0,
+                "consumers": np.full(2, 1.5),
+                "range_m": (240.0, 360.0),
+            },
         }
         return {
             name: [
