@@ -50,7 +50,7 @@ SEAM_RAD = 0.01
 """Headings lie within a half turn of this, so that 3.1416 stays what it is."""
 
 
-ORDINARY_M = (0.5, 2.0)
+ORDINARY_M = (0.25, 2.0)
 """Radii of circles about robots for which a metre is the unit: of the fleet's the
 geometric mean counts."""
 

@@ -318,7 +318,7 @@ def test_the_unit_of_lengths_leaves_powers_as_they_are(unit_m: float) -> None:
 
 def test_ordinary_robots_and_wide_maps_have_metres() -> None:
     scene, _ = as_it_lies("two_swap")
-    for size in (0.5, 1.0, 1.5):
+    for size in (0.25, 1.0, 1.5):
         assert Frame.of(of_size(scene, size)).unit_m == 1.0
     small = of_size(scene, 2.0**-5)
     wide = replace(small, bounds=(0.0, 0.0, 500.0, 500.0))
