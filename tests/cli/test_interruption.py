@@ -344,9 +344,7 @@ def test_a_child_that_the_first_look_misses_is_ended_too() -> None:
         "interruption._children = lambda process: next(looks)\n"
         "interruption.end()\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
+    ended = _run(code)
     assert ended.returncode == 130
     assert not Path(f"/proc/{int(ended.stdout)}").exists()
 
@@ -362,9 +360,7 @@ def test_an_interrupt_that_compiled_code_prints_ends_the_process() -> None:
         "    sys.excepthook(*sys.exc_info())  # as PyErr_Print does, which returns\n"
         "print('went on')\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
+    ended = _run(code)
     assert (ended.returncode, ended.stdout) == (130, "")
     assert ended.stderr == "mrmg: stopped; the same command takes it up again\n"
 
@@ -382,11 +378,16 @@ def test_what_misses_a_child_that_was_ended_says_nothing() -> None:
         "with interruption.cleaned_up_by(lambda: time.sleep(0.5)):\n"
         "    interruption.end()\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
-    )
+    ended = _run(code)
     assert ended.returncode == 130
     assert ended.stderr == "mrmg: stopped; the same command takes it up again\n"
+
+
+def _run(code: str) -> subprocess.CompletedProcess[str]:
+    """Run Python code in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
 
 
 def _read_to_the_end(screen: int) -> None:
