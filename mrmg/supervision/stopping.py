@@ -70,7 +70,7 @@ def brake_to_rest(model: RobotModel, state: np.ndarray, dt_s: float) -> Motion:
         state: (x, y, theta, v, psi) at the beginning, shape (5,).
         dt_s: length of a step.
     """
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     step = plain_step(model)
     turns_on_the_spot = model.motion_model == "unicycle"
     states, controls = [tuple(float(value) for value in state)], []

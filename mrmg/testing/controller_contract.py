@@ -161,7 +161,7 @@ def moved(model: RobotModel, state: np.ndarray, control: np.ndarray) -> np.ndarr
 def reference_of(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
     """Return controls that switch within the planner's limits, and their states."""
     rng = np.random.default_rng(2)
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     ticks, held = round(DURATION_S / TICK_S), round(SWITCHING_S / TICK_S)
     states, controls = np.zeros((ticks + 1, NX)), np.zeros((ticks, 2))
     for k in range(ticks):

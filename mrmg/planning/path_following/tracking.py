@@ -199,7 +199,8 @@ def deceleration(problem: Problem, r: int) -> float:
     """
     robot = problem.mission.fleet[r]
     hardest = float(robot["limit"][3])
-    if problem.minimum_time or brakes_hard(problem.scene, r):
+    driving = problem.preference.driving
+    if problem.minimum_time or brakes_hard(driving, problem.scene.robots[r]):
         return HARD_SHARE * hardest
     ground = float(problem.mission.terrain.multiplier.min())
     mass = max(float(robot["energy"][EFFECTIVE_MASS_KG]), 1e-9)

@@ -64,6 +64,7 @@ class Problem:
         roadmap: its roadmap.
         mission: the arrays that kernels work on.
         start: composite state at the start, shape (R, 5).
+        preference: what plans are compared by.
         start_energy: battery contents at the start [J], shape (R,).
         dt_s: time step of plans [s].
         route_margin: surcharge on the roadmap's energies in `mission.routing`.
@@ -77,17 +78,13 @@ class Problem:
     roadmap: Roadmap
     mission: Mission
     start: np.ndarray
+    preference: Preference
     start_energy: np.ndarray
     dt_s: float
     route_margin: float
     openings: tuple[Opening, ...] = ()
     minimum_time: bool = False
     soc_margin: float = 0.0
-
-    @property
-    def preference(self) -> Preference:
-        """What plans are compared by."""
-        return Preference.of(self.scene)
 
     def aims(self, robot: int, tour: Sequence[int]) -> np.ndarray:
         """Return the headings that a path must have at the targets of a tour [rad].
@@ -230,6 +227,7 @@ def state_problem(
         roadmap=roadmap,
         mission=mission,
         start=start,
+        preference=Preference.of(scene),
         start_energy=energy,
         dt_s=params.dt_s,
         route_margin=params.route_margin,

@@ -49,12 +49,16 @@ def time_counts(scene: Scene) -> bool:
     return float(np.mean(shares)) < TIMED_SHARE
 
 
-def brakes_hard(scene: Scene, r: int) -> bool:
-    """Return whether robot r brakes instead of rolling to a stop.
+def brakes_hard(objective: Objective, robot: Robot) -> bool:
+    """Return whether a robot brakes instead of rolling to a stop.
 
     Rolling saves the power of driving for as long as it takes longer.
+
+    Args:
+        objective: as of `energy_share`.
+        robot: the robot.
     """
-    return energy_share(Preference.of(scene).driving, scene.robots[r]) < 0.5
+    return energy_share(objective, robot) < 0.5
 
 
 def priced_world(scene: Scene, world: World) -> World:

@@ -117,7 +117,7 @@ def motion_addresses(model: RobotModel) -> tuple[int, int]:
     """
     if model.motion_model in MODEL_ID:
         return 0, 0
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     return motion_of(model).compiled(limits.as_tuple())
 
 
@@ -137,7 +137,7 @@ def fleet_array(scene: Scene, world: World, margins: Margins) -> np.ndarray:
     _, fields = travel_classes(scene, world, margins)
     for r, robot in enumerate(scene.robots):
         model, battery = robot.model, robot.battery
-        limits = model.limits.scaled(model.planning_share)
+        limits = model.planned_limits
         outline = model.footprint_m
         if len(outline) > MOST_CORNERS:
             message = f"has {len(outline)} corners, at most {MOST_CORNERS} are allowed"

@@ -140,7 +140,7 @@ def _secants(
     model: RobotModel, law: PowerLaw, parameters: np.ndarray
 ) -> tuple[float, float]:
     """Return power over speed at cruise, and over yaw rate in the planned turn."""
-    limits = model.limits.scaled(model.planning_share)
+    limits = model.planned_limits
     speed = limits.v_max_m_s
     car = model.motion_model == "car"
     turn_speed = speed if car else 0.0

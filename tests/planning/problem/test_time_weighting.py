@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,9 +35,9 @@ def test_the_share_falls_as_seconds_get_worth_more(yard: Any) -> None:
 
 
 def test_robots_brake_hard_where_time_is_worth_more_than_driving(yard: Any) -> None:
-    scene = yard()
-    assert not brakes_hard(replace(scene, objective=ENERGY), 0)
-    assert brakes_hard(replace(scene, objective=MAKESPAN), 0)
+    (robot,) = yard().robots
+    assert not brakes_hard(ENERGY, robot)
+    assert brakes_hard(MAKESPAN, robot)
 
 
 def test_decelerations_follow_from_the_objective(yard: Any) -> None:
