@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.background import in_background
-from mrmg.planning.bound.bound import CELLS, FINER, ROUNDS, lower_bound_J
+from mrmg.planning.bound.bound import ROUNDS, lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.bound.relaxation import CELLS, FINER
 from mrmg.planning.consumers import without_consumers
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.preference import Preference

@@ -16,9 +16,10 @@ from mrmg.compilation import (
     note_kernels_are_compiled,
 )
 from mrmg.planning.attempt import Request
-from mrmg.planning.bound.bound import Relaxation, lower_bound_J
+from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.bounding import bounds_of
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.parameters import (

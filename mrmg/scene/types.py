@@ -318,6 +318,11 @@ class Scene:
         """Whether a robot moves by Python code of its model, which was trusted."""
         return any(robot.model.has_custom_motion for robot in self.robots)
 
+    @property
+    def has_destinations(self) -> bool:
+        """Whether there is a goal or a finish to drive to."""
+        return bool(self.goals) or any(robot.finish for robot in self.robots)
+
     def robot(self, robot_id: str) -> Robot:
         """Return the robot of that id; raises UsageError if there is none."""
         return of_robot(robot_id, {robot.id: robot for robot in self.robots})

@@ -62,6 +62,7 @@ class Labels(NamedTuple):
             end, shape (X + 1,).
         near: labels that the present goal may follow, shape (N,).
         offer, origin: candidates' values and parents, shape (N, 2) and (N,).
+        tried: how many candidates there were, shape (1,).
     """
 
     value: np.ndarray
@@ -71,6 +72,7 @@ class Labels(NamedTuple):
     near: np.ndarray
     offer: np.ndarray
     origin: np.ndarray
+    tried: np.ndarray
 
 
 @kernel

@@ -100,7 +100,8 @@ class ArcWays:
         from_start = np.maximum(
             away.reshape(len(starts), count, ARCS), ways.from_start[..., None]
         )
-        between.transpose(0, 2, 1, 3)[ways.overlap] = 0.0
+        free = ways.overlap & ~_crossed(ways)
+        between.transpose(0, 2, 1, 3)[free] = 0.0
         from_start[ways.from_start == 0.0] = 0.0
         for table in (between, from_start):
             table[table > 0.5 * UNREACHED] = np.inf
@@ -108,7 +109,8 @@ class ArcWays:
         np.fill_diagonal(away_m, np.inf)
         smooth = np.array([graph.smooth_arcs(region) for region in regions])
         smooth &= ((away_m.min(axis=0) > APART_M) & (np.arange(count) < goals))[:, None]
-        found = ArcWays(ways, graph, between, from_start, starts, smooth)
+        known = set(zip(*np.nonzero(free), strict=True))
+        found = ArcWays(ways, graph, between, from_start, starts, smooth, known)
         between -= found.slack[:, :, None, None] + found.slack
         from_start -= found.slack
         for table in (between, from_start):
@@ -138,17 +140,22 @@ class ArcWays:
         """Return whether the ways of a pair can be tightened."""
         origin, target = pair
         known = pair in self.known or (target, origin) in self.known
-        return not known and origin != target and 0.0 < self._least(pair) < np.inf
+        least = self._least(pair)
+        return not known and (origin >= 0 or least > 0.0) and least < np.inf
 
-    def certificate(self, pair: Pair) -> np.ndarray:
-        """Return bounds of the ways from arc to arc, shape (K or 1, K)."""
+    def certificate(self, pair: Pair) -> tuple[np.ndarray, bool]:
+        """Return bounds of the ways from arc to arc, shape (K or 1, K).
+
+        And whether more may be found of them once these are known: all are longer than
+        what was looked at.
+        """
         origin, target = pair
         known = self._known(pair)
         most = (1.0 + NEAR_SHARE) * float(known[np.isfinite(known)].max()) + NEAR_M
         over = self._cost_to(origin) + self._cost_to(target)
         nodes = np.flatnonzero(over <= most)
         if len(nodes) > MOST_NODES:
-            return np.zeros((1, 1))
+            return np.zeros((1, 1)), False
         if origin < 0:
             first = place_of(self.starts[-1 - origin])
         else:
@@ -158,11 +165,13 @@ class ArcWays:
             0.0 if origin < 0 else self.slack[origin][:, None]
         )
         found = self.graph.least_costs(nodes, first, last)
-        return np.asarray(np.minimum(found, most - slack))
+        longer = bool(np.all(found > most - slack))
+        return np.asarray(np.minimum(found, most - slack)), longer
 
-    def take(self, pair: Pair, apart: np.ndarray) -> None:
+    def take(self, pair: Pair, apart: np.ndarray, longer: bool) -> None:
         """Tighten the ways of a pair by a certificate."""
-        self.known.add(pair)
+        if not longer:
+            self.known.add(pair)
         old = self._known(pair)
         np.maximum(old, apart, out=old)
         origin, target = pair
@@ -208,3 +217,15 @@ class ArcWays:
         row = np.clip(row, 0, rows).astype(int)
         column = np.clip(column, 0, columns).astype(int)
         return np.asarray(around[row, column])
+
+
+def _crossed(ways: Ways) -> np.ndarray:
+    """Return which pairs of regions are touched one after the other, (T, T).
+
+    Who starts in a region has touched it there, and perhaps another one that overlaps
+    it; all others cross borders on their way, one after the other.
+    """
+    entered = np.all(ways.from_start > 0.0, axis=0)
+    crossed: np.ndarray = entered[:, None] & entered
+    np.fill_diagonal(crossed, False)
+    return crossed

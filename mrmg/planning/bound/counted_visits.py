@@ -29,8 +29,11 @@ MOST_WORK = 500_000_000
 remembered: a second or two of one processor."""
 
 
-def counted_visits(problem: RoutingArrays) -> Visits:
-    """Return good prices for a mission of many goals, and which ones are remembered."""
+def counted_visits(problem: RoutingArrays) -> tuple[Visits, float]:
+    """Return good prices for a mission of many goals, and which ones are remembered.
+
+    And what they prove where none is.
+    """
     order = np.flatnonzero(problem.open_goal)
     visits = Visits(order, 0, np.zeros(problem.cost.shape[2]))
     legs = least_legs(problem, visits)
@@ -55,7 +58,7 @@ def counted_visits(problem: RoutingArrays) -> Visits:
     remembered = most_remembered(len(order))
     order = order[np.argsort(-wrong, kind="stable")]
     own[order[:remembered]] = 0.0
-    return replace(best, order=order, remembered=remembered, price=own)
+    return replace(best, order=order, remembered=remembered, price=own), best_J
 
 
 def most_remembered(goals: int) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -274,6 +274,19 @@ class Ways:
             overlap=apart_m <= 0.0,
             between=way,
             from_start=start_way,
+        )
+
+    def among(self, count: int) -> Ways:
+        """Return the ways of the first regions alone."""
+        return replace(
+            self,
+            regions=self.regions[:count],
+            fields=self.fields[:count],
+            highest=self.highest[:count],
+            lowest=self.lowest[:count, :count],
+            overlap=self.overlap[:count, :count],
+            between=self.between[:count, :count],
+            from_start=self.from_start[:, :count],
         )
 
 

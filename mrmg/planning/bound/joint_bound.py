@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.planning.bound._subset_kernels import least_division
-from mrmg.planning.bound.bound import CELLS, ROUNDING_SHARE, Relaxation, most_descent_J
+from mrmg.planning.bound.bound import ROUNDING_SHARE
 from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.bound.makespan_bound import least_times_s
+from mrmg.planning.bound.relaxation import CELLS, Relaxation
 from mrmg.planning.halting import NEVER
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
@@ -36,12 +37,10 @@ class Divisions:
     Attributes:
         energy_J: shape (R, 2^G), inf where batteries do not allow it.
         time_s: shape (R, 2^G).
-        descent_J: what the fleet can gain by ending on low ground.
     """
 
     energy_J: np.ndarray
     time_s: np.ndarray
-    descent_J: float
 
     @staticmethod
     def of(
@@ -58,7 +57,8 @@ class Divisions:
         """
         if not 0 < len(scene.goals) <= MOST_GOALS or scene.has_custom_motion:
             return None
-        problem = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt).problem
+        relaxed = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt)
+        problem = relaxed.with_end_climbs()
         goals = np.arange(len(scene.goals))
         energy_J = []
         for r in range(len(scene.robots)):
@@ -69,7 +69,6 @@ class Divisions:
         return Divisions(
             energy_J=np.array(energy_J),
             time_s=least_times_s(scene, step_s=step_s, cells=cells, halt=halt),
-            descent_J=sum(most_descent_J(scene, robot) for robot in scene.robots),
         )
 
     @property
@@ -80,7 +79,7 @@ class Divisions:
     def energy_within_J(self, limit_s: float) -> float:
         """Return an energy that no plan undercuts which is over by `limit_s`."""
         timely_J = np.where(self.time_s <= limit_s, self.energy_J, np.inf)
-        least_J = float(least_division(timely_J, False)) - self.descent_J
+        least_J = float(least_division(timely_J, False))
         return max(0.0, least_J) * (1.0 - ROUNDING_SHARE)
 
     def value(self, objective: Objective, limit_s: float = math.inf) -> float:

@@ -1,7 +1,8 @@
 """A proven lower bound of a mission's duration.
 
 As in the bound of energy (`bound`), whoever solves a mission visits the goals in some
-order, each robot a part of them, on ways no shorter than the shortest round obstacles.
+order, each robot a part of them, and drives on to its finish if it has one, on ways no
+shorter than the shortest round obstacles.
 Here robots drive them at top speed on any ground, from rest to rest, and stay at goals
 as long as they must; the longest time of a robot is the mission's. Batteries, turning
 and other robots could only make it longer. The least over all divisions and orders is
@@ -16,18 +17,14 @@ import numpy as np
 
 from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.bound._subset_kernels import least_division
-from mrmg.planning.bound.bound import (
-    CELLS,
-    ROUNDING_SHARE,
-    Relaxation,
-    relaxed_routing_J,
-)
+from mrmg.planning.bound.bound import ROUNDING_SHARE, relaxed_routing_J
 from mrmg.planning.bound.exact_tours import (
     MOST_GOALS,
     least_costs,
     of_robot,
     with_endless_batteries,
 )
+from mrmg.planning.bound.relaxation import CELLS, Relaxation
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.scene.types import Robot, Scene
@@ -59,7 +56,7 @@ def makespan_bound_s(
     Raises:
         Halted: if it was given up.
     """
-    if not scene.goals:
+    if not scene.has_destinations:
         return 0.0
     if len(scene.goals) > MOST_GOALS:
         bound_s = _relaxed_s(scene, _metres(scene, step_s, cells, halt))
@@ -91,8 +88,12 @@ def _metres(scene: Scene, step_s: float, cells: int, halt: np.ndarray) -> Routin
     """Return the problem whose costs are lengths, and whose batteries never run out."""
     flat = replace(scene, terrain=(), elevation=None)
     relaxed = Relaxation.of(flat, step_s=step_s, cells=cells, halt=halt)
-    length_m = relaxed.problem.cost / relaxed.price[:, None, None]
-    return with_endless_batteries(relaxed.problem._replace(cost=length_m))
+    problem, price = relaxed.problem, relaxed.price
+    lengths = {
+        "cost": problem.cost / price[:, None, None],
+        "finish": problem.finish / price[:, None],
+    }
+    return with_endless_batteries(problem._replace(**lengths))
 
 
 def _stays_s(scene: Scene) -> np.ndarray:
@@ -136,8 +137,12 @@ def _relaxed_s(scene: Scene, metres: RoutingArrays) -> float:
     divided equally among all robots.
     """
     top_m_s = np.array([_fastest_m_s(robot) for robot in scene.robots])
-    times = metres._replace(cost=metres.cost / top_m_s[:, None, None])
+    cost, finish = (
+        metres.cost / top_m_s[:, None, None],
+        metres.finish / top_m_s[:, None],
+    )
+    times = metres._replace(cost=cost, finish=finish)
     stay_s = np.array([goal.dwell_s for goal in scene.goals])
-    nearest_s = times.cost[:, -1, : len(scene.goals)].min(axis=0)
+    nearest_s = (cost[:, -1] + finish[:, :-1])[:, : len(scene.goals)].min(axis=0)
     shared_s = (relaxed_routing_J(times) + stay_s.sum()) / len(scene.robots)
     return float(max((nearest_s + stay_s).max(), shared_s))

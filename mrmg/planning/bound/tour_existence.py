@@ -1,6 +1,6 @@
 """Proof that no tours exist which keep every battery above its reserve.
 
-A relaxed mission, in which every leg costs at most what it must (`bound.Relaxation`),
+A relaxed mission, in which every leg costs at most what it must (`relaxation`),
 is searched completely. With V_r(S, g) the most energy above the reserve that robot r
 can have left at goal g after goals S, c_r a leg's bound and F_r a full battery,
 
@@ -29,7 +29,6 @@ import numpy as np
 import shapely
 
 from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
-from mrmg.planning.bound.bound import Relaxation
 from mrmg.planning.bound.exact_tours import (
     MOST_GOALS,
     MOST_LABELS,
@@ -37,6 +36,7 @@ from mrmg.planning.bound.exact_tours import (
     of_robot,
     with_endless_batteries,
 )
+from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
@@ -82,13 +82,13 @@ def proof_of_no_tours(
     Raises:
         Halted: if it was given up.
     """
-    if not scene.goals and not any(robot.finish for robot in scene.robots):
+    if not scene.has_destinations:
         return None
     if scene.elevation is not None and step_s < SHORTEST_ON_SLOPES_S:
         return None  # slopes are charged over longer times, in which speeds may change
     if scene.has_custom_motion:
         return None  # see `lower_bound_J`
-    relaxed = Relaxation.of(scene, step_s=step_s, with_finishes=True, halt=halt)
+    relaxed = Relaxation.of(scene, step_s=step_s, halt=halt)
     problem = _with_climbs(relaxed)
     for goals in _goals_to_try(problem):
         check(halt)

@@ -2,8 +2,10 @@
 
 `bound` takes the way between two regions for granted however the robot gets from where
 it enters a region to where it leaves it. Here a visit has one place: the arc of the
-border where the region is first touched. Only tours whose cost can be below some limit
-are looked at, so the result is the least cost of all tours or the limit.
+border where the region is first touched; who touches goals inside a station enters it
+before and leaves it afterwards, which may count as two visits. Only tours whose cost
+can be below some limit are looked at, so the result is the least cost of all tours or
+the limit.
 """
 
 from __future__ import annotations
@@ -36,6 +38,9 @@ otherwise labels would be too many ..."""
 
 FINE_ARC_LEGS = 20_000_000
 """... and legs from arc to arc up to which they are, by their memory (160 MB)."""
+
+SHORT_ROUND = 1_000
+"""Labels up to which the next round looks at tours that cost twice as much more."""
 
 LONG_ROUND = 100_000
 """Labels of a round, some 0.3 s of work, after which the ways between near places are
@@ -101,12 +106,12 @@ def touring_bound_J(
         if cheapest:
             best, pairs = max(best, found.cost_J), _pairs_of(ways, found.tours)
             enough = best < (1.0 + LEAST_RISE) * settled_J
-            settled_J = best
+            settled_J, step = best, FINE_STEP
         else:
             best = max(best, most)
+            step *= 2.0 if labels < SHORT_ROUND else 1.0
         if enough or labels >= work:
             break
-        step = FINE_STEP if math.isfinite(settled_J) else STEP
         if labels > LONG_ROUND and not all_near:
             pairs, rest, all_near = pairs | _near_pairs(ways), None, True
     return best
@@ -135,8 +140,8 @@ def _tighten(pairs: Pairs) -> bool:
     new = {at: ways for at, ways in pairs.items() if ways.is_loose(at[1])}
     with ThreadPoolExecutor() as threads:
         found = threads.map(lambda at: new[at].certificate(at[1]), new)
-        for (key, pair), apart in zip(new, found, strict=True):
-            new[key, pair].take(pair, apart)
+        for (key, pair), certificate in zip(new, found, strict=True):
+            new[key, pair].take(pair, *certificate)
     return bool(new)
 
 

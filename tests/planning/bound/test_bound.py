@@ -13,9 +13,12 @@ import pytest
 
 from mrmg.planning import plan_mission
 from mrmg.planning.bound._eikonal_kernels import UNREACHED, certified_field
-from mrmg.planning.bound.bound import Relaxation, lower_bound_J, relaxed_routing_J
+from mrmg.planning.bound.bound import lower_bound_J, relaxed_routing_J
+from mrmg.planning.bound.clearance import passing_radius_m
 from mrmg.planning.bound.exact_tours import PRUNED_GOALS, exact_routing
 from mrmg.planning.bound.geodesic import Field, Look
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
@@ -265,7 +268,7 @@ def test_no_goal_costs_nothing() -> None:
     assert lower_bound_J(scene_from_document(document, source="idle")) == 0.0
 
 
-def test_slopes_lower_the_bound_by_what_starting_high_is_worth(yard: Yard) -> None:
+def test_slopes_change_the_bound_by_what_the_climb_is_worth(yard: Yard) -> None:
     """20.5 m of way; half a metre of height is worth 8.3 m of plain ground."""
     joules = yard().robots[0].model.energy_model.plain_ground_J_per_m()
     flat_J = lower_bound_J(yard())
@@ -273,13 +276,72 @@ def test_slopes_lower_the_bound_by_what_starting_high_is_worth(yard: Yard) -> No
         lower_bound_J(yard(elevation={"grid": [[a, b]] * 2}))
         for a, b in ((0.0, 0.6), (0.6, 0.0))
     )
-    assert up_J == pytest.approx(flat_J)
-    # From x = 4, and half a metre before it, down to the far side of the goal.
-    drop_m = 0.02 * (27.5 - 4.0 + 1.2)
-    worth_J = drop_m / 0.06 * joules
-    assert flat_J - 1.1 * worth_J <= down_J <= flat_J - 0.85 * worth_J
-    exact_J = (20.5 - 20.5 * 0.02 / 0.06) * joules
-    assert down_J <= exact_J
+    # Regions and starts are as low or high as their lowest and highest places are, half
+    # a metre about them: less is known of the climb, and more of the descent.
+    worth_J = 20.5 * 0.02 / 0.06 * joules
+    assert flat_J + 0.85 * worth_J <= up_J <= flat_J + worth_J
+    assert flat_J - 1.35 * worth_J <= down_J <= flat_J - worth_J
+
+
+def test_hollows_and_robots_that_stay_put_lower_nothing(yard: Yard) -> None:
+    """The hollow lies beside the way: no tour ends in it."""
+    hollow = {"hills": [{"center": [15, 10], "height": -0.3, "radius": 6}]}
+    robots = [
+        {"id": f"r{k}", "model": "car", "pose": [4, 4 + 4 * k, 0]} for k in range(4)
+    ]
+    flat_J = lower_bound_J(yard(robots=robots))
+    assert lower_bound_J(yard(robots=robots, elevation=hollow)) == pytest.approx(flat_J)
+
+
+def test_a_robot_drives_on_to_its_finish(yard: Yard) -> None:
+    """There 20.5 m, back to within 1 m of the start."""
+    joules = yard().robots[0].model.energy_model.plain_ground_J_per_m()
+    robot = {"id": "r1", "model": "car", "pose": [4, 10, 0], "finish": "start"}
+    there_and_back_m = lower_bound_J(yard(robots=[robot])) / joules
+    assert 39.7 <= there_and_back_m <= 40.0
+    assert makespan_bound_s(yard(robots=[robot])) > 1.8 * makespan_bound_s(yard())
+    short = {"capacity_m": 35}
+    assert lower_bound_J(yard(battery=short)) < math.inf
+    assert lower_bound_J(yard(robots=[robot], battery=short)) == math.inf
+
+
+def test_finishes_alone_have_bounds(yard: Yard) -> None:
+    """Both drive 9 m, one of them not at all where it is to end where it starts."""
+    joules = yard().robots[0].model.energy_model.plain_ground_J_per_m()
+    robots = [
+        {
+            "id": f"r{k}",
+            "model": "car",
+            "pose": [4, y, 0],
+            "finish": {"circle": {"center": [14, y], "radius": 1.0}},
+        }
+        for k, y in enumerate((4.0, 16.0))
+    ]
+    scene = yard(goals=[], robots=robots)
+    assert 17.8 <= lower_bound_J(scene) / joules <= 18.0
+    assert makespan_bound_s(scene) > 9.0 / scene.robots[0].model.top_speed_m_s
+    robots[1]["finish"] = "start"
+    assert 8.9 <= lower_bound_J(yard(goals=[], robots=robots)) / joules <= 9.0
+
+
+@pytest.mark.parametrize("shift_m", [0.0, 0.03, 0.06, 0.09])
+def test_gaps_a_little_too_narrow_are_closed_wherever_cells_lie(
+    yard: Yard, shift_m: float
+) -> None:
+    """A wall of two boxes, cornerwise; the way round it leads along the far bound."""
+    scene = yard(
+        obstacles=[
+            {"id": "a", "box": {"center": [14 + shift_m, 4.45], "size": [1, 9]}},
+            {"id": "b", "box": {"center": [15.9 + shift_m, 11.0], "size": [1, 4.4]}},
+        ]
+    )
+    gap_m = math.hypot(15.4 - 14.5, 8.95 - 8.8)
+    model = scene.robots[0].model
+    assert 0.8 < gap_m < 2.0 * passing_radius_m(model)
+    joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    corner = np.array([15.9 + shift_m, 13.2 + model.inscribed_radius_m])
+    way_m = math.dist((4, 10), corner) + math.dist(corner, (26, 10)) - 1.5
+    assert lower_bound_J(scene) / joules == pytest.approx(way_m, rel=0.04)
 
 
 @pytest.mark.parametrize("regeneration", [0.0, 0.7])

@@ -32,7 +32,7 @@ def random_divisions(seed: int) -> Divisions:
     energy_J[rng.random(energy_J.shape) < 0.1] = np.inf
     energy_J[:, 0] = 0.0
     time_s = 10.0 * size * rng.uniform(0.5, 1.5, (ROBOTS, FULL + 1))
-    return Divisions(energy_J=energy_J, time_s=time_s, descent_J=0.0)
+    return Divisions(energy_J=energy_J, time_s=time_s)
 
 
 def all_divisions(one: Divisions) -> list[tuple[float, float]]:

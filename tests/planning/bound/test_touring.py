@@ -18,9 +18,10 @@ import mrmg
 from mrmg.planning.bound import touring
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
-from mrmg.planning.bound.bound import Relaxation, lower_bound_J
+from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.completions import Visits, completions
 from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
+from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
@@ -226,7 +227,7 @@ def tightened(scene: Scene, *pairs: tuple[int, int]) -> ArcWays:
     ways = arc_ways(scene)
     for pair in pairs:
         assert ways.is_loose(pair)
-        ways.take(pair, ways.certificate(pair))
+        ways.take(pair, *ways.certificate(pair))
         assert not ways.is_loose(pair)
         assert not ways.is_loose(pair[::-1])
     return ways
@@ -389,6 +390,42 @@ def test_no_tour_that_touches_all_goals_costs_less_than_the_bound(
     price = scene.robots[0].model.energy_model.plain_ground_J_per_m()
     bound_m = lower_bound_J(scene) / price
     assert 0.98 * least <= bound_m <= least
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_goals_that_overlap_on_costly_ground_are_told_apart(seed: int) -> None:
+    """Against tours by way of dense points of their borders; a station beside them."""
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0.0, 2.0 * np.pi, 300)[:, None]
+    ring = 1.5 * np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
+    centres = rng.uniform((18.0, 6.0), (25.0, 13.0), (4, 2))
+    apart = np.hypot(*(centres[:, None] - centres).transpose(2, 0, 1))
+    assert (apart < 3.0).sum() > 4, "none overlaps another one"
+    scene = field(
+        goals=[
+            {"id": f"g{k}", "circle": {"center": center.tolist(), "radius": 1.5}}
+            for k, center in enumerate(centres)
+        ],
+        stations=[{"id": "s", "circle": {"center": [21, 9], "radius": 1.5}}],
+        terrain=[
+            {
+                "id": "sand",
+                "polygon": [[8, 0], [32, 0], [32, 20], [8, 20]],
+                "multiplier": 5.0,
+            }
+        ],
+        robots=[{"id": "r1", "model": "car", "pose": [12, 10, 0]}],
+    )
+    least = math.inf
+    for order in permutations(range(4)):
+        cost, points = np.zeros(1), np.array([[12.0, 10.0]])
+        for k in order:
+            to = centres[k] + ring
+            leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
+            cost, points = (cost[:, None] + leg).min(axis=0), to
+        least = min(least, 5.0 * float(cost.min()))
+    price = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    assert 0.78 * least <= lower_bound_J(scene) / price <= least
 
 
 def _off(points: np.ndarray, corner: np.ndarray) -> np.ndarray:
