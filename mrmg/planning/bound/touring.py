@@ -40,7 +40,7 @@ FINE_ARC_LEGS = 20_000_000
 """... and legs from arc to arc up to which they are, by their memory (160 MB)."""
 
 SHORT_ROUND = 1_000
-"""Labels up to which the next round looks at tours that cost twice as much more."""
+"""Labels of a round up to which the next one's step may be longer in any case."""
 
 LONG_ROUND = 100_000
 """Labels of a round, some 0.3 s of work, after which the ways between near places are
@@ -88,7 +88,7 @@ def touring_bound_J(
     visits = visits or Visits.all_remembered(problem)
     best, pairs = relaxed.cost_J, _pairs_of(ways, relaxed.tours)
     settled_J, rest, cheapest, all_near = -math.inf, None, False, False
-    step = STEP
+    step, labels = STEP, 0
     leg = _room_for_legs(ways, problem.goals)
     for _ in range(rounds):
         tightened = _tighten(pairs)
@@ -98,6 +98,7 @@ def touring_bound_J(
         rest = rest or completions(problem, leg, visits)
         best = max(best, float(rest.before[0]) - visits.surcharge)
         most = (1.0 + step) * best
+        before = labels
         found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
         work -= labels
         if found is None:
@@ -109,12 +110,22 @@ def touring_bound_J(
             settled_J, step = best, FINE_STEP
         else:
             best = max(best, most)
-            step *= 2.0 if labels < SHORT_ROUND else 1.0
+            step = _longer(step, labels, before)
         if enough or labels >= work:
             break
         if labels > LONG_ROUND and not all_near:
             pairs, rest, all_near = pairs | _near_pairs(ways), None, True
     return best
+
+
+def _longer(step: float, labels: int, before: int) -> float:
+    """Return the step after a round without tours.
+
+    It is twice as long while labels are few, or less than twice those of the round
+    before: then much costlier tours are as quickly looked at.
+    """
+    slowly = labels < min(2 * before, LONG_ROUND)
+    return 2.0 * step if slowly or labels < SHORT_ROUND else step
 
 
 def _pairs_of(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> Pairs:
