@@ -42,6 +42,7 @@ def main() -> int:
         return 2
     mission = f"{options.robots} robots, {options.goals} goals"
     mission += f", placement {options.placement}, idle power {options.idle_power:g} W"
+    mission += ", back to the start" if options.finish_at_start else ""
     print(f"{__doc__}\n{mission}\n\n{bench.protocol(options)}")
     scenes = ((str(path), populated(path, options)) for path in options.maps)
     return bench.plan_each(scenes, options, "bench_maps")
@@ -57,6 +58,8 @@ def parse_options() -> argparse.Namespace:
     power = {"type": float, "default": 0.0, "metavar": "W"}
     more = "of each robot, default 0; batteries hold what it takes on the way, too"
     parser.add_argument("--idle-power", **power, help=more)
+    back = "have every robot end where it starts"
+    parser.add_argument("--finish-at-start", action="store_true", help=back)
     bench.add_mission_options(parser, seeds="0-19")
     return parser.parse_args()
 
@@ -72,6 +75,10 @@ def populated(path: Path, options: argparse.Namespace) -> Scene:
         )
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
+    if options.finish_at_start:
+        document = scene.document
+        back = [{**robot, "finish": "start"} for robot in document["robots"]]
+        scene = scene_from_document({**document, "robots": back}, source=str(path))
     robots = tuple(drawing(robot, options.idle_power) for robot in scene.robots)
     return replace(scene, robots=robots)
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import bench_maps
+import numpy as np
 import pytest
 
 
@@ -34,6 +35,19 @@ def test_the_bench_plans_on_a_map_and_writes_rows(
     (line,) = written["rows"]
     assert (line["scene"], line["ok"], line["runs"]) == ("hall", 2, 2)
     assert [Path(one).name for one in written["protocol"]["maps"]] == [hall.name]
+
+
+def test_robots_may_have_to_end_where_they_start(
+    hall: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = [str(hall), "--robots", "2", "--goals", "3"]
+    for more, back in (([], False), (["--finish-at-start"], True)):
+        monkeypatch.setattr(sys, "argv", ["bench", *options, *more])
+        scene = bench_maps.populated(hall, bench_maps.parse_options())
+        for robot in scene.robots:
+            assert (robot.finish is not None) == back
+            if robot.finish:
+                assert robot.finish.region.depth(np.array([robot.pose[:2]])) > 0.0
 
 
 def test_a_map_that_is_not_there_is_named(
