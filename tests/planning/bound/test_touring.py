@@ -396,8 +396,6 @@ def test_no_tour_that_touches_all_goals_costs_less_than_the_bound(
 def test_goals_that_overlap_on_costly_ground_are_told_apart(seed: int) -> None:
     """Against tours by way of dense points of their borders; a station beside them."""
     rng = np.random.default_rng(seed)
-    angle = np.linspace(0.0, 2.0 * np.pi, 300)[:, None]
-    ring = 1.5 * np.concatenate([np.cos(angle), np.sin(angle)], axis=1)
     centres = rng.uniform((18.0, 6.0), (25.0, 13.0), (4, 2))
     apart = np.hypot(*(centres[:, None] - centres).transpose(2, 0, 1))
     assert (apart < 3.0).sum() > 4, "none overlaps another one"
@@ -416,16 +414,24 @@ def test_goals_that_overlap_on_costly_ground_are_told_apart(seed: int) -> None:
         ],
         robots=[{"id": "r1", "model": "car", "pose": [12, 10, 0]}],
     )
-    least = math.inf
-    for order in permutations(range(4)):
-        cost, points = np.zeros(1), np.array([[12.0, 10.0]])
+    least = 5.0 * shortest_tour_m((12.0, 10.0), centres)
+    price = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    assert 0.78 * least <= lower_bound_J(scene) / price <= least
+
+
+def shortest_tour_m(start: tuple[float, float], centres: np.ndarray) -> float:
+    """Return the shortest tour by dense points of borders of circles of 1.5 m."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 721)
+    ring = 1.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    least_m = math.inf
+    for order in permutations(range(len(centres))):
+        cost, points = np.zeros(1), np.array([start])
         for k in order:
             to = centres[k] + ring
             leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
             cost, points = (cost[:, None] + leg).min(axis=0), to
-        least = min(least, 5.0 * float(cost.min()))
-    price = scene.robots[0].model.energy_model.plain_ground_J_per_m()
-    assert 0.78 * least <= lower_bound_J(scene) / price <= least
+        least_m = min(least_m, float(cost.min()))
+    return least_m
 
 
 def _off(points: np.ndarray, corner: np.ndarray) -> np.ndarray:
@@ -557,16 +563,7 @@ def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
     coarse_m, touring_m = (
         lower_bound_J(scene, rounds=rounds) / joules for rounds in (0, 20)
     )
-    angle = np.linspace(0.0, 2.0 * np.pi, 721)
-    ring = 1.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    exact_m = math.inf
-    for order in permutations(range(3)):
-        cost, points = np.zeros(1), np.array([[16.0, 4.0]])
-        for k in order:
-            to = TRIANGLE[k] + ring
-            leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
-            cost, points = (cost[:, None] + leg).min(axis=0), to
-        exact_m = min(exact_m, float(cost.min()))
+    exact_m = shortest_tour_m((16.0, 4.0), TRIANGLE)
     finer_m = lower_bound_J(scene, finer=7) / joules
     assert coarse_m < touring_m <= finer_m <= exact_m + 1e-3
     assert touring_m >= 0.97 * exact_m
