@@ -29,6 +29,7 @@ class TourSearch(NamedTuple):
         station_drain: (R, S, T, K).
         nearest: the least that they cost to any arc, shape (R, T + 1, K, T).
         price: added to the cost of each visit, shape (T,).
+        setting_out: what each robot pays in any case, shape (R,).
         finish: what the last leg costs from each node, shape (R, T + 1).
         rest: bounds of what is still to come, by which labels are dropped.
         most: cost of tours of interest; others may be missed.
@@ -43,6 +44,7 @@ class TourSearch(NamedTuple):
     station_drain: np.ndarray
     nearest: np.ndarray
     price: np.ndarray
+    setting_out: np.ndarray
     finish: np.ndarray
     rest: Completions
     most: float

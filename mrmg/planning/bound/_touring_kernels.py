@@ -74,7 +74,8 @@ def cheapest_tours(search, room):
                 cost[state] + search.rest.before[state] <= search.most
             ):
                 if count < room:
-                    set_value(labels, count, cost[state], problem.energy[r])
+                    priced = cost[state] + search.setting_out[r]
+                    set_value(labels, count, priced, problem.energy[r])
                     set_trace(labels, count, r, start, 0, last[state])
                 count += 1
             for g in range(n):

@@ -28,7 +28,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.planning.bound import _bound_kernels
-from mrmg.planning.bound.completions import Visits, over_stations
+from mrmg.planning.bound.completions import over_stations
 from mrmg.planning.bound.counted_visits import counted_visits
 from mrmg.planning.bound.exact_tours import are_few, exact_routing
 from mrmg.planning.bound.relaxation import CELLS, FINER, Relaxation
@@ -93,44 +93,22 @@ def lower_bound_J(
     relaxed = Relaxation.of(
         scene, step_s=step_s, cells=cells, shared=not by_arcs, halt=halt
     )
-    problem, visits, spare_J = relaxed.with_end_climbs(), None, 0.0
+    problem = relaxed.with_end_climbs()
     routing = exact_routing(problem) if few else None
     bound = routing.cost_J if routing else relaxed_routing_J(problem)
-    if not few and by_arcs:
-        problem, visits, spare_J = _many_visits(relaxed)
     if scene.goals and by_arcs and rounds and not halt[0]:
         routing = routing or solve_routing(problem, RouterParams(), 0)
         if routing.feasible:
             bound = touring_bound_J(
                 problem,
-                replace(routing, cost_J=bound + spare_J),
+                replace(routing, cost_J=bound),
                 relaxed.arc_ways(finer),
                 relaxed.price,
-                visits=visits,
+                visits=None if few else counted_visits(problem),
                 rounds=rounds,
                 halt=halt,
             )
-            bound -= spare_J
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
-
-
-def _many_visits(relaxed: Relaxation) -> tuple[RoutingArrays, Visits, float]:
-    """Return the problem of many goals, its visits, and what tours pay too much in it.
-
-    Where visits are counted, nobody counts how many robots set out. From high ground
-    all of them would roll down again and again; so tours may better end on the level,
-    and each robot gain once what ending low is worth.
-    """
-    level, climbing = relaxed.problem, relaxed.with_end_climbs()
-    visits, walk_J = counted_visits(climbing)
-    if climbing is not level:
-        on_level, level_J = counted_visits(level)
-        finite = np.isfinite(level.finish)
-        ends_J = [np.where(finite, one.finish, 0.0) for one in (level, climbing)]
-        spare_J = float((ends_J[0] - ends_J[1]).max(axis=1).sum())
-        if level_J - spare_J > walk_J:
-            return level, on_level, spare_J
-    return climbing, visits, 0.0
 
 
 def relaxed_routing_J(problem: RoutingArrays) -> float:

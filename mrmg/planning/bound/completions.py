@@ -19,28 +19,36 @@ from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 class Visits:
     """Which goals are visited, and which visits are remembered.
 
-    Tours that visit every goal once pay all prices once, which is taken off their cost.
+    Tours of all robots that visit every goal once pay all prices once, which is taken
+    off their cost. Robots that are not needed pay for setting out, too.
 
     Attributes:
         order: numbers of the goals, shape (G,); those that are remembered come first.
         remembered: how many are; visits of the others are only counted.
         price: what a visit of each target costs in addition [J], shape (T,).
+        setting_out: what each robot pays when it sets out [J], shape (R,), at least 0.
     """
 
     order: np.ndarray
     remembered: int
     price: np.ndarray
+    setting_out: np.ndarray
 
     @staticmethod
     def all_remembered(problem: RoutingArrays) -> Visits:
         """Return the visits of a mission of few goals."""
-        order = np.flatnonzero(problem.open_goal)
-        return Visits(order, len(order), np.zeros(problem.cost.shape[2]))
+        return Visits.remembering(problem, np.flatnonzero(problem.open_goal))
+
+    @staticmethod
+    def remembering(problem: RoutingArrays, goals: np.ndarray) -> Visits:
+        """Return the visits of some goals, all remembered, at no price."""
+        price = np.zeros(problem.cost.shape[2])
+        return Visits(goals, len(goals), price, np.zeros(len(problem.energy)))
 
     @property
     def surcharge(self) -> float:
         """What tours that visit every goal once pay too much [J]."""
-        return float(self.price[self.order].sum())
+        return float(self.price[self.order].sum() + self.setting_out.sum())
 
 
 def completions(
@@ -87,11 +95,16 @@ def least_legs(
     legs = Legs(
         between=between,
         pair=pair,
-        from_start=least[:, start, order].min(axis=0),
+        from_start=(least[:, start, order] + visits.setting_out[:, None]).min(axis=0),
         to_end=least[:, order, start].min(axis=0),
         price=visits.price[order],
     )
     return Legs._make(map(np.ascontiguousarray, legs))
+
+
+def first_legs(problem: RoutingArrays, order: np.ndarray) -> np.ndarray:
+    """Return the least costs from each start to goals, over any stations, (R, G)."""
+    return np.asarray(_with_finish(problem)[:, problem.cost.shape[2], order])
 
 
 def _with_finish(problem: RoutingArrays) -> np.ndarray:

@@ -125,6 +125,7 @@ def _search(
         station_drain=drain[:, stations].min(axis=2),
         nearest=leg.min(axis=4),
         price=visits.price,
+        setting_out=visits.setting_out,
         finish=problem.finish,
         rest=rest,
         most=most + visits.surcharge,
@@ -147,7 +148,7 @@ def least_costs(
     cost, finish = problem.cost, problem.finish
     if free:
         cost, finish = (np.where(np.isfinite(one), 0.0, one) for one in (cost, finish))
-    visits = Visits(goals, len(goals), np.zeros(cost.shape[2]))
+    visits = Visits.remembering(problem, goals)
     leg = np.ascontiguousarray(cost[:, :, None, :, None])
     drain = np.ascontiguousarray(problem.cost[:, :, None, :, None])
     rest = completions(problem, visits=visits)  # drops none, as all are of interest

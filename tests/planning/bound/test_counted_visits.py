@@ -16,6 +16,7 @@ from mrmg.planning.bound.counted_visits import MOST_WORK, most_remembered
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.scene.loading import scene_from_document
 
 Mission = Callable[..., RoutingArrays]
 
@@ -29,7 +30,7 @@ def test_walks_cost_no_more_than_tours(
         problem = mission(seed, goals=6, stations=2, robots=2, range_m=(60.0, 160.0))
         exact = exact_routing(problem)
         assert exact is not None
-        visits, _ = counted_visits.counted_visits(problem)
+        visits = counted_visits.counted_visits(problem)
         assert sorted(visits.order) == list(range(6))
         least_J = completions(problem, None, visits).before[0]
         assert least_J - visits.surcharge <= exact.cost_J * (1.0 + 1e-9)
@@ -41,7 +42,7 @@ def test_prices_raise_what_walks_cost(
     monkeypatch.setattr(counted_visits, "most_remembered", lambda goals: 0)
     for seed in range(4):
         problem = mission(seed, goals=9, stations=1, robots=2, range_m=(1e6, 2e6))
-        visits, _ = counted_visits.counted_visits(problem)
+        visits = counted_visits.counted_visits(problem)
         free = replace(visits, price=np.zeros_like(visits.price))
         priced_J, free_J = (
             float(completions(problem, None, each).before[0]) - each.surcharge
@@ -62,7 +63,7 @@ def test_prices_rise_where_a_robot_starts_in_a_goal(
     problem.cost[0, -1, 4] = 0.0
     exact = exact_routing(problem)
     assert exact is not None
-    visits, _ = counted_visits.counted_visits(problem)
+    visits = counted_visits.counted_visits(problem)
     priced_J = completions(problem, None, visits).before[0] - visits.surcharge
     assert 0.7 * exact.cost_J <= priced_J <= exact.cost_J * (1.0 + 1e-9)
 
@@ -90,3 +91,31 @@ def test_counted_visits_bound_a_mission_between_trees_and_all_tours(
     assert counted_J >= 0.95 * exact_J
     monkeypatch.setattr(bound, "MOST_TARGETS", 0)
     assert lower_bound_J(scene) == pytest.approx(tree_J, rel=1e-3)
+
+
+def test_robots_roll_down_from_high_ground_only_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Walks that may set out again and again pay for that, or they cost nothing."""
+    places = np.random.default_rng(1).uniform((12.0, 4.0), (56.0, 36.0), (8, 2))
+    goals = [
+        {"id": f"g{k}", "circle": {"center": place, "radius": 1.0}}
+        for k, place in enumerate(places.tolist())
+    ]
+    robots = [{"id": f"r{y}", "model": "car", "pose": [8, y, 0]} for y in (16, 20, 24)]
+    hill = {"center": [10, 20], "height": 1.5, "radius": 18}
+    scene = scene_from_document(
+        {
+            "format": 1,
+            "name": "hill",
+            "bounds": [0, 0, 60, 40],
+            "battery": {"capacity_m": 4000},
+            "elevation": {"hills": [hill]},
+            "goals": goals,
+            "robots": robots,
+        },
+        source="hill",
+    )
+    exact_J = lower_bound_J(scene)
+    monkeypatch.setattr(bound, "are_few", lambda goals, robots: False)
+    assert lower_bound_J(scene) == pytest.approx(exact_J, rel=1e-3)

@@ -169,6 +169,7 @@ def test_counted_visits_prove_no_more_than_the_cheapest_tours_cost(
                 order=rng.permutation(goals),
                 remembered=remembered,
                 price=np.append(rng.normal(0.0, 5.0, goals), np.zeros(stations)),
+                setting_out=np.abs(rng.normal(0.0, 5.0, robots)),
             )
             every = cheapest_tours(
                 problem, leg, no_completions(problem, visits), 1e5, visits=visits
