@@ -56,8 +56,7 @@ class Labels(NamedTuple):
     Memory that is not written is not used.
 
     Attributes:
-        value: cost and energy left of the present robot's labels, in their order, shape
-            (N, 2).
+        value: cost and energy left, shape (N, 2).
         place: robot, node and arc, shape (N, 3).
         parent: the label that each one continues, shape (N,).
         first: number of the first label of the present robot in each state, and of the
@@ -75,20 +74,6 @@ class Labels(NamedTuple):
     offer: np.ndarray
     origin: np.ndarray
     tried: np.ndarray
-
-
-@kernel
-def set_value(labels, k, cost, left):
-    """Write the value of label k, one of the present robot."""
-    own = k - labels.first[0]
-    labels.value[own, 0], labels.value[own, 1] = cost, left
-
-
-@kernel
-def value_of(labels, k):
-    """Return cost and energy left of label k, one of the present robot."""
-    own = k - labels.first[0]
-    return labels.value[own, 0], labels.value[own, 1]
 
 
 @kernel

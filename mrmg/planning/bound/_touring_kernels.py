@@ -28,8 +28,6 @@ from mrmg.planning.bound._label_kernels import (
     NOTHING,
     Labels,
     set_trace,
-    set_value,
-    value_of,
 )
 
 TRIES = 50
@@ -75,7 +73,10 @@ def cheapest_tours(search, room):
             ):
                 if count < room:
                     priced = cost[state] + search.setting_out[r]
-                    set_value(labels, count, priced, problem.energy[r])
+                    labels.value[count, 0], labels.value[count, 1] = (
+                        priced,
+                        problem.energy[r],
+                    )
                     set_trace(labels, count, r, start, 0, last[state])
                 count += 1
             for g in range(n):
@@ -121,7 +122,7 @@ def _visit_goal(search, labels, r, state, g, count):
                 continue
             if left <= most_left and source in (NOTHING, origin):
                 continue
-            alike = count > first and value_of(labels, count - 1)[0] == cost
+            alike = count > first and labels.value[count - 1, 0] == cost
             if alike and left >= most_left and origin < 0:
                 count -= 1  # as costly, and no more energy left
             if left <= most_left:
@@ -130,7 +131,7 @@ def _visit_goal(search, labels, r, state, g, count):
                 if source != origin:
                     other_left = most_left
                 most_left, source = left, origin
-            set_value(labels, count, cost, left)
+            labels.value[count, 0], labels.value[count, 1] = cost, left
             set_trace(labels, count, r, goal, arc, labels.origin[k])
             count += 1
     return count
@@ -156,7 +157,7 @@ def _near(search, labels, r, rest, g, ahead):
             before = labels.place[labels.parent[k], 1]
             if goal in (node, before):
                 continue
-        cost, left = value_of(labels, k)
+        cost, left = labels.value[k, 0], labels.value[k, 1]
         left -= problem.cost[r, node, goal]
         cost += price + search.nearest[r, node, from_arc, goal]
         if left < problem.reserve[r] or cost == np.inf:
@@ -184,7 +185,7 @@ def _offers(search, labels, r, near, goal, arc, ahead):
     labels.tried[0] += near
     for k in labels.near[:near]:
         node, from_arc = labels.place[k, 1], labels.place[k, 2]
-        cost, left = value_of(labels, k)
+        cost, left = labels.value[k, 0], labels.value[k, 1]
         cost += price + search.leg[r, node, from_arc, goal, arc]
         if problem.goals <= node < start:
             left -= search.station_drain[r, node - problem.goals, goal, arc]
@@ -220,7 +221,7 @@ def _visit_stations(search, labels, r, state, count):
     for s in range(stations):
         ahead[s] = _after_station(search, r, state, s)
     for k in range(labels.first[state], count):
-        usable = value_of(labels, k)[1] - problem.reserve[r]
+        usable = labels.value[k, 1] - problem.reserve[r]
         _lead_on(search, labels, r, k, usable, ahead, cost, origin)
     done = np.zeros((stations, arcs), np.bool_)
     while True:
@@ -232,7 +233,7 @@ def _visit_stations(search, labels, r, state, count):
         if s < 0:
             return count
         done[s, arc] = True
-        set_value(labels, count, least, problem.capacity[r])
+        labels.value[count, 0], labels.value[count, 1] = least, problem.capacity[r]
         set_trace(labels, count, r, goals + s, arc, origin[s, arc])
         usable = problem.capacity[r] - problem.reserve[r]
         _lead_on(search, labels, r, count, usable, ahead, cost, origin)
@@ -253,7 +254,7 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
     """
     node, from_arc = labels.place[k, 1], labels.place[k, 2]
     goals, start = search.routing.goals, search.leg.shape[3]
-    charged, before = goals <= node < start, value_of(labels, k)[0]
+    charged, before = goals <= node < start, labels.value[k, 0]
     for s in range(len(cost)):
         if search.routing.cost[r, node, goals + s] > usable or node == goals + s:
             continue
@@ -296,7 +297,7 @@ def _end_tours(search, labels, r, cost, last):
         cost[state] = np.inf
         for k in range(labels.first[state], labels.first[state + 1]):
             node = labels.place[k, 1]
-            before, left = value_of(labels, k)
+            before, left = labels.value[k, 0], labels.value[k, 1]
             drain = problem.finish[r, node]
             total = before + search.finish[r, node]
             enough = drain <= 0.0 or left - drain >= problem.reserve[r]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.world._polygon_kernels import corners_from_sides
 
 SAMPLING = 0.7
 """Distance of the points at which prices along a piece are read, over a cell's side,
@@ -101,7 +102,8 @@ def _straight(cells, first, i, second, j):
     highest = _highest(cells, ax, ay, bx, by)
     if highest == np.inf:
         return np.inf
-    length = _apart(first.end[i], second.end[j])
+    a, b = first.end[i], second.end[j]
+    length = min(corners_from_sides(a, b), corners_from_sides(b, a))
     length -= first.sagitta[i] + second.sagitta[j]
     slack = first.slack[i] + second.slack[j]
     if slack > 0.0:
@@ -140,28 +142,6 @@ def _highest(cells, ax, ay, bx, by):
         highest = max(highest, cells.price[row, column])
         at += max(SAMPLING, cells.even[row, column])
     return highest
-
-
-@kernel
-def _apart(one, other):
-    """Return the distance of two lines that do not cross, shape (2, 2) each."""
-    least = np.inf
-    for k in range(2):
-        least = min(least, _off(one, other[k, 0], other[k, 1]))
-        least = min(least, _off(other, one[k, 0], one[k, 1]))
-    return least
-
-
-@kernel
-def _off(line, x, y):
-    """Return the distance of a point from a line, shape (2, 2)."""
-    dx, dy = line[1, 0] - line[0, 0], line[1, 1] - line[0, 1]
-    size = dx * dx + dy * dy
-    share = 0.0
-    if size > 0.0:
-        share = ((x - line[0, 0]) * dx + (y - line[0, 1]) * dy) / size
-        share = min(1.0, max(0.0, share))
-    return hypot(x - line[0, 0] - share * dx, y - line[0, 1] - share * dy)
 
 
 @kernel

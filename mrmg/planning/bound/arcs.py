@@ -100,7 +100,7 @@ class ArcWays:
         from_start = np.maximum(
             away.reshape(len(starts), count, ARCS), ways.from_start[..., None]
         )
-        free = ways.overlap & ~_crossed(ways)
+        free = (ways.between == 0.0) & ~_crossed(ways)
         between.transpose(0, 2, 1, 3)[free] = 0.0
         from_start[ways.from_start == 0.0] = 0.0
         for table in (between, from_start):
@@ -139,9 +139,10 @@ class ArcWays:
     def is_loose(self, pair: Pair) -> bool:
         """Return whether the ways of a pair can be tightened."""
         origin, target = pair
-        known = pair in self.known or (target, origin) in self.known
-        least = self._least(pair)
-        return not known and (origin >= 0 or least > 0.0) and least < np.inf
+        if pair in self.known or (target, origin) in self.known:
+            return False
+        bound = self._known(pair)
+        return bool(bound.min() < np.inf and (origin >= 0 or bound.max() > 0.0))
 
     def certificate(self, pair: Pair) -> tuple[np.ndarray, bool]:
         """Return bounds of the ways from arc to arc, shape (K or 1, K).
@@ -184,13 +185,6 @@ class ArcWays:
         if origin < 0:
             return self.from_start[-1 - origin, None, target]
         return self.between[origin, :, target]
-
-    def _least(self, pair: Pair) -> float:
-        """Return the bound of all ways to a region from another one or a start."""
-        origin, target = pair
-        if origin < 0:
-            return float(self.ways.from_start[-1 - origin, target])
-        return float(self.ways.between[origin, target])
 
     def _cost_to(self, place: int) -> np.ndarray:
         """Return the least cost from a region or start to each bend."""

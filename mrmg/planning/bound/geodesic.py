@@ -119,7 +119,6 @@ class Ground:
         *,
         cell_m: float,
         step_m: float,
-        reach_m: float = 0.0,
     ) -> Ground:
         """Return the ground of a scene.
 
@@ -129,15 +128,10 @@ class Ground:
             cell_m: side of a cell.
             step_m: longest way of one planning step. A step is charged at its middle,
                 which is at most half of it away from any point of it.
-            reach_m: how far from a cell prices count besides.
         """
         x_min, y_min, _, _ = scene.bounds
-        price = least_prices(
-            scene,
-            blocked,
-            cell_m=cell_m,
-            reach_m=charged_within_m(step_m) + reach_m,
-        )
+        reach_m = charged_within_m(step_m)
+        price = least_prices(scene, blocked, cell_m=cell_m, reach_m=reach_m)
         return Ground(float(x_min), float(y_min), cell_m, price, blocked)
 
     def look_at(self, points: np.ndarray, reach_m: float) -> Look:
@@ -210,8 +204,7 @@ class Ways:
         fields: one from each region.
         highest: bound of each region's own field on its border, shape (T,).
         lowest: bounds of each region's field on the arcs of borders, shape (T, T, K).
-        overlap: which regions do, shape (T, T).
-        between: from region to region, shape (T, T).
+        between: from region to region, shape (T, T); 0 where they overlap.
         from_start: from start to region, shape (R, T); inf where there is no way.
     """
 
@@ -220,7 +213,6 @@ class Ways:
     fields: list[Field]
     highest: np.ndarray
     lowest: np.ndarray
-    overlap: np.ndarray
     between: np.ndarray
     from_start: np.ndarray
 
@@ -271,7 +263,6 @@ class Ways:
             fields=fields,
             highest=highest,
             lowest=lowest,
-            overlap=apart_m <= 0.0,
             between=way,
             from_start=start_way,
         )
@@ -284,7 +275,6 @@ class Ways:
             fields=self.fields[:count],
             highest=self.highest[:count],
             lowest=self.lowest[:count, :count],
-            overlap=self.overlap[:count, :count],
             between=self.between[:count, :count],
             from_start=self.from_start[:, :count],
         )

@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.bound._subset_kernels import least_division
 from mrmg.planning.bound.bound import ROUNDING_SHARE, relaxed_routing_J
 from mrmg.planning.bound.exact_tours import (
@@ -88,12 +87,15 @@ def _metres(scene: Scene, step_s: float, cells: int, halt: np.ndarray) -> Routin
     """Return the problem whose costs are lengths, and whose batteries never run out."""
     flat = replace(scene, terrain=(), elevation=None)
     relaxed = Relaxation.of(flat, step_s=step_s, cells=cells, halt=halt)
-    problem, price = relaxed.problem, relaxed.price
-    lengths = {
-        "cost": problem.cost / price[:, None, None],
-        "finish": problem.finish / price[:, None],
-    }
-    return with_endless_batteries(problem._replace(**lengths))
+    return with_endless_batteries(_over(relaxed.problem, relaxed.price))
+
+
+def _over(problem: RoutingArrays, divisor: np.ndarray) -> RoutingArrays:
+    """Return a problem whose costs are divided by a number of each robot, (R,)."""
+    return problem._replace(
+        cost=problem.cost / divisor[:, None, None],
+        finish=problem.finish / divisor[:, None],
+    )
 
 
 def _stays_s(scene: Scene) -> np.ndarray:
@@ -118,7 +120,7 @@ def _times_s(robot: Robot, way_m: np.ndarray, stay_s: np.ndarray) -> np.ndarray:
     """
     top_m_s = _fastest_m_s(robot)
     times_s: np.ndarray = way_m / top_m_s + stay_s
-    if robot.model.motion_model not in MODEL_ID:
+    if robot.model.has_custom_motion:
         return times_s  # nothing is known of how it speeds up
     strongest = robot.model.limits.u1_max_m_s2
     long = way_m >= top_m_s * top_m_s / strongest
@@ -137,12 +139,9 @@ def _relaxed_s(scene: Scene, metres: RoutingArrays) -> float:
     divided equally among all robots.
     """
     top_m_s = np.array([_fastest_m_s(robot) for robot in scene.robots])
-    cost, finish = (
-        metres.cost / top_m_s[:, None, None],
-        metres.finish / top_m_s[:, None],
-    )
-    times = metres._replace(cost=cost, finish=finish)
+    times = _over(metres, top_m_s)
     stay_s = np.array([goal.dwell_s for goal in scene.goals])
-    nearest_s = (cost[:, -1] + finish[:, :-1])[:, : len(scene.goals)].min(axis=0)
+    nearest_s = times.cost[:, -1] + times.finish[:, :-1]
+    nearest_s = nearest_s[:, : len(scene.goals)].min(axis=0)
     shared_s = (relaxed_routing_J(times) + stay_s.sum()) / len(scene.robots)
     return float(max((nearest_s + stay_s).max(), shared_s))

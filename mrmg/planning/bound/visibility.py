@@ -26,8 +26,8 @@ from mrmg.planning.bound.borders import (
     chords,
     half_arc_m,
 )
-from mrmg.planning.bound.geodesic import Ground, charged_within_m
-from mrmg.planning.bound.prices import surroundings
+from mrmg.planning.bound.geodesic import charged_within_m
+from mrmg.planning.bound.prices import least_prices, surroundings
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
 
@@ -74,12 +74,11 @@ class VisibilityGraph:
                 for it.
         """
         reach_m = max(reach_m, 0.5 * BORDER_M)
-        ground = Ground.of(
+        price = least_prices(
             scene,
             blocked.buffer(-reach_m - 2.0 * SIMPLER_M),
             cell_m=cell_m,
-            step_m=step_m,
-            reach_m=reach_m,
+            reach_m=charged_within_m(step_m) + reach_m,
         )
         solid = blocked.buffer(-SIMPLER_M).simplify(SIMPLER_M)
         limits = shapely.union_all(
@@ -93,13 +92,7 @@ class VisibilityGraph:
         x, y = bends.end[:, 0].T
         inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
         return VisibilityGraph(
-            cells=Cells(
-                ground.price,
-                _even_about(ground.price),
-                ground.x_min,
-                ground.y_min,
-                ground.cell_m,
-            ),
+            cells=Cells(price, _even_about(price), float(x_min), float(y_min), cell_m),
             bends=Places(*(column[inside] for column in bends)),
             edges=shapely.union_all([solid, limits, borders]),
             highest=max([1.0, *(area.multiplier for area in scene.terrain)]),
