@@ -8,6 +8,7 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.planning.problem._clearance_kernels import moves_clear
+from mrmg.planning.problem._control_kernels import keeps_limits
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces, middle_at
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
@@ -20,9 +21,6 @@ from mrmg.world._polygon_kernels import (
     point_distance,
     way_of_corners,
 )
-
-STATE_ROUNDING = 1e-9
-"""Rounding of summed steps that is forgiven in the limits of speed and steering."""
 
 
 class Setting(NamedTuple):
@@ -68,16 +66,6 @@ class Rules(NamedTuple):
 
 
 @kernel
-def within_limits(robot, state):
-    """Return whether speed and steering (or turning rate) keep the robot's limits."""
-    if state[3] < robot.limit[0] - STATE_ROUNDING:
-        return False
-    if state[3] > robot.limit[1] + STATE_ROUNDING:
-        return False
-    return abs(state[4]) <= robot.limit[2] + STATE_ROUNDING
-
-
-@kernel
 def collision_free(setting, before, state):
     """Return whether a step keeps all limits and margins (CollisionFree).
 
@@ -94,7 +82,7 @@ def collision_free(setting, before, state):
     way = np.empty(len(fleet))
     for r in range(len(fleet)):
         own, here = fleet[r : r + 1], state[r]
-        if not within_limits(fleet[r], here):
+        if not keeps_limits(fleet[r], here):
             return False
         if not moves_clear(own, setting.spaces, before[r], here, corner[r]):
             return False

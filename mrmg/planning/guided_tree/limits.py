@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from mrmg.errors import UsageError
-from mrmg.motion._kernels import MODEL_ID
 from mrmg.scene.types import Scene
 
 
@@ -39,9 +38,7 @@ def unknown_features(scene: Scene) -> list[str]:
         ],
         "finishes": [robot.id for robot in scene.robots if robot.finish],
         "custom motion models": [
-            robot.id
-            for robot in scene.robots
-            if robot.model.motion_model not in MODEL_ID
+            robot.id for robot in scene.robots if robot.model.has_custom_motion
         ],
     }
     found = [f"{name} ({', '.join(ids)})" for name, ids in places.items() if ids]

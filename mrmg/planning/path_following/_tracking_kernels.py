@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import borrowed, kernel
 from mrmg.motion._kernels import step
 from mrmg.planning.path_following._following_kernels import (
     at_rest,
@@ -38,6 +38,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
         (steps, whether it got there); if it did not, it would run into an obstacle or
         stray from its path after the last of them, or there was no more room.
     """
+    own, spaces, terrain, course = borrowed((own, spaces, terrain, course))
     corner = np.empty((MOST_CORNERS, 2))
     segment, stood, spent = first_segment(course, state[0]), 0, 0.0
     for k in range(len(control)):

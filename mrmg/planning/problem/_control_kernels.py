@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from math import pi
 
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined, kernel
 from mrmg.motion._kernels import CAR, USER, steer_user
 
 REST = 1e-9
 """Speed below which a robot counts as standing [m/s]."""
+
+ROUNDING = 1e-10
+"""What speed and steering may be beyond their limits: sums of accelerations are not
+exact. The verifier lets ten times as much pass."""
 
 
 @kernel
@@ -51,6 +55,14 @@ def braking_control(fleet, r, state, dt):
     if fleet[r].model != CAR:
         u2 = toward_zero(state[4], fleet[r].limit[4], dt)
     return u1, u2
+
+
+@inlined
+def keeps_limits(robot, state):
+    """Return whether speed and steering, or turning rate, keep a robot's limits."""
+    limit, v, w = robot.limit, state[3], state[4]
+    beyond = max(limit[0] - v, v - limit[1], abs(w) - limit[2])
+    return beyond <= ROUNDING
 
 
 @kernel

@@ -133,10 +133,10 @@ def drive_to(search, target, room, control):
     straight and turns, or along a curve where it is there sooner.
     """
     own, targets = search.own, search.targets
-    course, corner, state = room.curve, room.corner[0], room.state
+    course, state = room.curve, room.state
     if own[0].model == USER:
         return steer_to(search, target, state, control)
-    x, y, heading = free_pose(search, target, corner)
+    x, y, heading = free_pose(search, target, room.corner[0])
     free = targets.target[target].tolerance >= pi
     tolerance = np.inf if free else targets.target[target].tolerance
     if own[0].model == CAR:
@@ -148,22 +148,22 @@ def drive_to(search, target, room, control):
         total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
         if not total < np.inf:
             return -1
-        return drive_curve(search, course, corner, state, control)
+        return drive_curve(search, course, state, control)
     curved = -1
     if not free:
         radius = smooth_radius(own[0])
         total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
         if total < np.inf:
-            curved = drive_curve(search, course, corner, state, control)
+            curved = drive_curve(search, course, state, control)
         if curved >= 0 and not at_target(targets, target, state[curved]):
             curved = -1
     total = write_curve(own, state[0], x, y, heading, tolerance, course, 0.0)
     if not total < np.inf:
         return -1
-    count = drive_curve(search, course, corner, state, control)
+    count = drive_curve(search, course, state, control)
     if curved >= 0 and (count < 0 or curved < count):
         write_curve(own, state[0], x, y, heading, tolerance, course, radius)
-        count = drive_curve(search, course, corner, state, control)
+        count = drive_curve(search, course, state, control)
     return count
 
 

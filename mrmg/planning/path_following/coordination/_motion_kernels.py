@@ -11,19 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import borrowed, inlined, kernel, record_type
+from mrmg.compilation import inlined, kernel, record_type
 from mrmg.motion._kernels import USER, steer_user, step
-from mrmg.planning.path_following._following_kernels import (
-    advance,
-    at_rest,
-    track_control,
-)
+from mrmg.planning.path_following._following_kernels import advance, track_control
+from mrmg.planning.path_following._tracking_kernels import drive
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
 from mrmg.planning.problem._clearance_kernels import moves_clear
-from mrmg.planning.problem._control_kernels import braking_control, control_towards
+from mrmg.planning.problem._control_kernels import (
+    braking_control,
+    control_towards,
+    keeps_limits,
+)
 from mrmg.planning.problem._region_kernels import in_region
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
@@ -33,10 +34,6 @@ numbered from MOVE on."""
 
 WAYPOINTS = 8
 """Motions of a custom motion model that steer to points; the others hold controls."""
-
-ROUNDING = 1e-10
-"""What a custom motion model's speed and steering may be beyond their limits: sums of
-accelerations are not exact. The verifier lets ten times as much pass."""
 
 SETTLING_SHARE = 0.45
 """Share of a turn's radius that a car may drive while it steers into the turn."""
@@ -85,14 +82,6 @@ class Traffic(NamedTuple):
     busy_left: np.ndarray
     release: np.ndarray
     end: int
-
-
-@inlined
-def keeps_limits(robot, state):
-    """Return whether speed and steering are within a robot's limits."""
-    limit, v, w = robot.limit, state[3], state[4]
-    beyond = max(limit[0] - v, v - limit[1], abs(w) - limit[2])
-    return beyond <= ROUNDING
 
 
 @inlined
@@ -276,7 +265,7 @@ def write_curve(own, state, x, y, theta, tolerance, course, radius):
 
 
 @kernel
-def drive_curve(search, course, corner, state, control):
+def drive_curve(search, course, state, control):
     """Drive along a path until the robot rests at its end; return the steps, or -1.
 
     It is given up where an obstacle is in the way.
@@ -284,22 +273,14 @@ def drive_curve(search, course, corner, state, control):
     Args:
         search: gives robot, surroundings and step.
         course: the path.
-        corner: room for a footprint, shape (M, 2).
         state: from state[0] on, shape (n, 5).
         control: shape (n, 2).
     """
-    search, course, corner = borrowed((search, course, corner))
     own, dt = search.own, search.dt
     way = course.node[max(course.size[0] - 1, 0)].way
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
-    most = min(most, len(control) - 1)
-    segment = 0 if course.size[0] > 1 else course.size[0]
-    for k in range(most):
-        if at_rest(own, course, segment, state[k]):
-            return k
-        u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
-        control[k, 0], control[k, 1] = u1, u2
-        step(own[0], state[k], u1, u2, dt, state[k + 1])
-        if not moves_clear(own, search.spaces, state[k], state[k + 1], corner):
-            return -1
-    return -1
+    control = control[: min(most, len(control) - 1)]
+    count, arrived = drive(
+        own, search.spaces, search.terrain, course, dt, np.empty(0), state, control
+    )
+    return count if arrived else -1
