@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -94,3 +95,13 @@ class Attempt:
     counts: Mapping[str, int] = field(default_factory=dict)
     tours_found: bool = True
     blocked: str = ""
+
+    def after(self, failed: Attempt) -> Attempt:
+        """Return this attempt with what one before it has found out."""
+        return replace(
+            self,
+            routing_s=failed.routing_s + self.routing_s,
+            counts=Counter(failed.counts) + Counter(self.counts),
+            tours_found=failed.tours_found or self.tours_found,
+            blocked=self.blocked or failed.blocked,
+        )

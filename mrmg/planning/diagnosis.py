@@ -281,11 +281,10 @@ def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
     stations, why = _unjoined(problem, params, stations=True)
     if stations:
         remedy = f"{remedy}; no path was found to {stations}: {why}"
-    if math.isinf(scene.time_limit_s):
-        return endings.NO_TOURS_FOUND.format(left_out=left_out, remedy=remedy)
-    return endings.NO_TOURS_IN_TIME.format(
-        limit_s=scene.time_limit_s, left_out=left_out, remedy=remedy
-    )
+    limit = ""
+    if math.isfinite(scene.time_limit_s):
+        limit = f" and the time limit of {scene.time_limit_s:g} s"
+    return endings.NO_TOURS_FOUND.format(limit=limit, left_out=left_out, remedy=remedy)
 
 
 def _no_battery_helps(scene: Scene) -> str:

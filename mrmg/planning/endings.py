@@ -57,13 +57,8 @@ NO_TIMELY_TOURS = (
 )
 NO_PATH = "no path was found to {places}, and no proof that there is none: {passages}"
 NO_TOURS_FOUND = (
-    "no tours were found that keep every battery above its reserve, and no proof that "
-    "there are none; the best ones on the roadmap {left_out}, and {remedy}"
-)
-NO_TOURS_IN_TIME = (
-    "no tours were found that keep every battery above its reserve and the time limit "
-    "of {limit_s:g} s, and no proof that there are none; the best ones on the roadmap "
-    "{left_out}, and {remedy}"
+    "no tours were found that keep every battery above its reserve{limit}, and no "
+    "proof that there are none; the best ones on the roadmap {left_out}, and {remedy}"
 )
 LATE = (
     "plans were found, but none in time: the earliest is over at {earliest} s, the "

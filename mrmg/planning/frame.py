@@ -22,7 +22,6 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
@@ -86,7 +85,7 @@ class Frame:
         Maps are not turned if the fleet starts all around the middle, and stay as they
         are if a robot has a user's motion, which may depend on the place.
         """
-        if any(robot.model.motion_model not in MODEL_ID for robot in scene.robots):
+        if scene.has_custom_motion:
             return Frame((0.0, 0.0, *scene.bounds[2:]), 0, margins, 1.0)
         unit_m = _unit_m(scene, margins)
         x_min, y_min, x_max, y_max = scene.bounds

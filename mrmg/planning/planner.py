@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -313,14 +312,8 @@ class _Planning:
         """
         if problem is None:
             return failed
-        found = self.planner(problem, request)
-        return replace(
-            found,
-            routing_s=failed.routing_s + found.routing_s,
-            counts=Counter(failed.counts) + Counter(found.counts),
-            tours_found=failed.tours_found or found.tours_found,
-            blocked=failed.blocked or found.blocked,
-        )
+        found = self.planner(problem, request).after(failed)
+        return replace(found, blocked=failed.blocked or found.blocked)
 
     def _in_time(self, call: Callable[[], Result]) -> Result | None:
         """Return what a call returns, or None once the budget is over."""

@@ -16,10 +16,6 @@ from mrmg.compilation import (
     note_kernels_are_compiled,
 )
 from mrmg.planning.attempt import Request
-from mrmg.planning.bound.bound import lower_bound_J
-from mrmg.planning.bound.exact_tours import exact_routing
-from mrmg.planning.bound.makespan_bound import makespan_bound_s
-from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.bounding import bounds_of
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.parameters import (
@@ -32,8 +28,8 @@ from mrmg.planning.parameters import (
 )
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.poses import posed
-from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
@@ -120,11 +116,8 @@ def load_bounds(objective: Objective) -> None:
 
 
 def bound_smallest() -> None:
-    """Bound the energy and the makespan of the smallest mission, in all ways."""
-    scene = _smallest_scene()
-    lower_bound_J(scene, cells=50)
-    makespan_bound_s(scene, cells=50)
-    exact_routing(Relaxation.of(scene, cells=50).problem)
+    """Bound the energy and the makespan of the smallest mission."""
+    load_bounds(Objective(energy_weight=1.0, makespan_weight=1.0))
 
 
 _CALLS = {

@@ -8,11 +8,9 @@ does not depend on the number of workers. With a time limit they count as they c
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import repeat
@@ -95,32 +93,31 @@ class Search:
         found = 0
         if self._enough(found):
             return None
-        with self._limited():
-            try:
-                for attempt in self._attempts():
-                    self.attempts += 1
-                    self.tours_found |= attempt.tours_found
-                    self.blocked = attempt.blocked or self.blocked
-                    self.statistics.add(dict(attempt.counts), attempt.routing_s)
-                    times = attempt.found_at or repeat(time.perf_counter())
-                    plans = zip(times, attempt.plans, strict=False)
-                    found += any([self._take(*each) for each in plans])
-                    self.on_progress(self._fraction(found), counted(found, "plan"))
-                    if self._enough(found):
-                        break
-                    if (
-                        self.attempts == 1
-                        and not found
-                        and self.proof(self.tours_missing, True)
-                    ):
-                        break
-            except KeyboardInterrupt:
-                if self.best is None or self.params.budget_s is None:
-                    raise
-                self.interrupted = True
-                interruption.accept()
-            finally:
-                self.halt[0] = True
+        try:
+            for attempt in self._attempts():
+                self.attempts += 1
+                self.tours_found |= attempt.tours_found
+                self.blocked = attempt.blocked or self.blocked
+                self.statistics.add(dict(attempt.counts), attempt.routing_s)
+                times = attempt.found_at or repeat(time.perf_counter())
+                plans = zip(times, attempt.plans, strict=False)
+                found += any([self._take(*each) for each in plans])
+                self.on_progress(self._fraction(found), counted(found, "plan"))
+                if self._enough(found):
+                    break
+                if (
+                    self.attempts == 1
+                    and not found
+                    and self.proof(self.tours_missing, True)
+                ):
+                    break
+        except KeyboardInterrupt:
+            if self.best is None or self.params.budget_s is None:
+                raise
+            self.interrupted = True
+            interruption.accept()
+        finally:
+            self.halt[0] = True
         return self.best
 
     def _attempts(self) -> Iterator[Attempt]:
@@ -135,30 +132,20 @@ class Search:
                 attempt = partial(self.attempt, self.begun, self.halt)
                 pending.append(in_background(attempt))
                 self.begun += 1
-            left_s = self.statistics.left_s(self.params.budget_s) + GRACE_S
-            done = finished(pending, left_s) if free else set()
+            done = self._done_in_time(pending) if free else set()
             if free and not done:
                 return
             ready = next((one for one in pending if one in done), pending[0])
             pending.remove(ready)
             yield ready.result()
 
-    @contextmanager
-    def _limited(self) -> Iterator[None]:
-        """Halt attempts under way when the time limit is reached."""
-        if self.params.budget_s is None:
-            yield
-            return
-        left_s = self.statistics.left_s(self.params.budget_s)
-        alarm = threading.Timer(
-            min(left_s, threading.TIMEOUT_MAX), lambda: self.halt.fill(True)
-        )
-        alarm.daemon = True
-        alarm.start()
-        try:
-            yield
-        finally:
-            alarm.cancel()
+    def _done_in_time(self, pending: list[Future[Attempt]]) -> set[Future[Attempt]]:
+        """Return attempts that are done once one is; halt all at the time limit."""
+        done = finished(pending, self.statistics.left_s(self.params.budget_s))
+        if not done:
+            self.halt[0] = True
+            done = finished(pending, GRACE_S)
+        return done
 
     def _take(self, found_at: float, plan: Plan) -> bool:
         """Keep a plan if it is the best so far; return whether it is in time."""

@@ -7,6 +7,7 @@ import numpy as np
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.time_weighting import energy_share
 
 DISCS_SHARE = 0.4
 """Distance of the discs that cover a footprint, at most, as a share of its width."""
@@ -25,7 +26,13 @@ CURVATURE_SHARE = 0.92
 """Share of the steering that a path uses."""
 
 
-def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
+def cost_maps_of(problem: Problem) -> list[CostMap]:
+    """Return what each robot's paths are priced on."""
+    smooth = smooth_terrain(problem.mission.terrain.multiplier)
+    return [_cost_map(problem, r, smooth) for r in range(len(problem.scene.robots))]
+
+
+def _cost_map(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
     """Return the cost map of robot r's paths; `smooth` is `smooth_terrain`."""
     robot = problem.mission.fleet[r]
     spaces = problem.mission.spaces
@@ -38,26 +45,30 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
     limit, margin_m = robot["limit"], (1.0 + ROOM_SHARE) * float(robot["margin"])
     if robot["model"] == UNICYCLE:
         arm = float(robot["track"])
+        # A radian takes as long as so much way, for which the robot slows down.
+        turning_m = limit[1] / limit[2]
         rate = 4.0 * limit[4] / limit[1] ** 2
         turning_room_m = model.circumscribed_radius_m + margin_m
     else:
-        arm = float(robot["wheelbase"])
+        arm, turning_m = float(robot["wheelbase"]), 0.0
         rate = limit[4] / (arm * limit[1])
         turning_room_m = 0.0
     energy = model.energy_model
+    scrub = arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9)
+    share = energy_share(problem.preference.driving, problem.scene.robots[r])
     return CostMap(
         x_min=spaces.x_min,
         y_min=spaces.y_min,
         cell=spaces.cell,
         distance=spaces.distance[robot["space"]],
-        multiplier=smooth,
+        multiplier=smooth if share == 1.0 else share * smooth + (1.0 - share),
         disc=low[0] + length * (np.arange(pieces) + 0.5),
         length=float(high[0] - low[0]),
         room=float(np.hypot(0.5 * length, half) + margin_m),
         turning_room=turning_room_m,
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
-        scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),
+        scrub=float(share * scrub + (1.0 - share) * turning_m),
     )
 
 

@@ -146,8 +146,7 @@ def _drawn(problem: Problem, request: Request, draw: Draw) -> Routing:
     )
     rows = np.minimum(np.arange(arrays.cost.shape[1]), places)
     factor = np.exp(draw.spread * noise[rows])
-    arrays = arrays._replace(cost=arrays.cost * factor, time=arrays.time * factor)
-    varied = replace(varied, mission=varied.mission._replace(routing=arrays))
+    varied = varied.with_routing(cost=arrays.cost * factor, time=arrays.time * factor)
     return tours_of(
         varied, request, seeding.stream_seed(request.seed, "tours", draw.number)
     )

@@ -7,7 +7,7 @@ than batteries have are found anew for what driving took.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -91,5 +91,4 @@ def with_driven_legs(problem: Problem, driven: Driven) -> Problem:
     finish = share * routing.finish
     for r, rest_J in driven.rest_J.items():
         finish[r] += rest_J
-    routing = routing._replace(cost=cost, escape=share * routing.escape, finish=finish)
-    return replace(problem, mission=problem.mission._replace(routing=routing))
+    return problem.with_routing(cost=cost, escape=share * routing.escape, finish=finish)

@@ -28,9 +28,10 @@ from mrmg.planning.path_following.band import (
 )
 from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.driven_legs import Driven, what_driving_took
 from mrmg.planning.path_following.gears import with_best_gears
-from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
+from mrmg.planning.path_following.refine import drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import whole_tours
@@ -107,16 +108,18 @@ def follow_tours(
         path = tour_path(problem, r, ahead, timed)
         path = _geared(problem, r, cost_map, path, judged=not (first or timed))
         tasks.append(RobotTask(tour, path, cost_map))
-    drive = drive_paths(problem, tasks, request.halt, soon=first, rounds=rounds)
-    if not drive.trajectories:
+    trajectories, failure = drive_paths(
+        problem, tasks, request.halt, soon=first, rounds=rounds
+    )
+    if not trajectories:
         led = any(len(task.path.target) > 0 for task in tasks)
-        return Followed(None, drive.failure, driven=False, led=led)
+        return Followed(None, failure, driven=False, led=led)
     plan, refusal = make_plan(
-        problem, request.seed, request.params, drive.trajectories, tours
+        problem, request.seed, request.params, trajectories, tours
     )
     if plan is not None:
         return Followed(plan)
-    took = what_driving_took(problem, drive.trajectories, tours)
+    took = what_driving_took(problem, trajectories, tours)
     return Followed(None, refusal, took=took)
 
 

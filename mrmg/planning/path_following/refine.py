@@ -13,18 +13,17 @@ keeps every battery above its reserve, and is better by the scene's objective.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from mrmg.motion._kernels import UNICYCLE, USER
+from mrmg.motion._kernels import USER
 from mrmg.planning.attempt import Request
-from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import no_path
-from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
+from mrmg.planning.path_following.cost_map import cost_maps_of, inflated
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.robot_task import RobotTask
@@ -33,7 +32,6 @@ from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import target_depth_m, whole_tours
-from mrmg.planning.problem.time_weighting import energy_share
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.plans import Plan, Trajectory
 
@@ -51,19 +49,6 @@ ROBOTS_MEET = "no motions were found that keep the robots apart"
 
 NEAR_M = 3.0
 """How near to each other two places are the same."""
-
-
-@dataclass(frozen=True, slots=True)
-class FleetDrive:
-    """What driving the fleet along its paths gave.
-
-    Attributes:
-        trajectories: of all robots; empty if it failed.
-        failure: why it did, in words.
-    """
-
-    trajectories: tuple[Trajectory, ...]
-    failure: str = ""
 
 
 def refine(problem: Problem, request: Request, plan: Plan) -> Plan:
@@ -115,7 +100,7 @@ def along_trajectories(
             path = path_of(tour, visits, problem.aims(r, tour), trajectory)
         before = Drive(Motion(trajectory.state, trajectory.control), True, np.zeros(0))
         tasks.append(RobotTask(tour, path, cost_maps[r], before))
-    return drive_paths(problem, tasks, halt).trajectories
+    return drive_paths(problem, tasks, halt)[0]
 
 
 def drive_paths(
@@ -125,7 +110,7 @@ def drive_paths(
     *,
     soon: bool | None = None,
     rounds: Sequence[Round] = ROUNDS[:1],
-) -> FleetDrive:
+) -> tuple[tuple[Trajectory, ...], str]:
     """Smooth paths and drive the fleet along them.
 
     Each robot drives as if it were alone; where robots get in each other's way, a
@@ -138,11 +123,14 @@ def drive_paths(
         soon: whether a way over poses that a robot drives where it does not get
             through is wanted soon rather than cheap; None if it does without.
         rounds: of the search for motions.
+
+    Returns:
+        Trajectories of all robots, none if it failed; and why it did, in words.
     """
     tasks, drives = list(tasks), []
     for r, task in enumerate(tasks):
         if halt[0]:
-            return FleetDrive(())
+            return (), ""
         drive, failure = _driven(problem, r, task)
         if drive is None and failure and soon is not None:
             other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
@@ -150,7 +138,7 @@ def drive_paths(
                 tasks[r] = other
                 drive, _ = _driven(problem, r, other)
         if drive is None and failure:
-            return FleetDrive((), failure)
+            return (), failure
         drives.append(drive)
     trajectories = coordinated(
         problem,
@@ -161,8 +149,8 @@ def drive_paths(
         drives=drives,
     )
     if trajectories:
-        return FleetDrive(trajectories)
-    return FleetDrive((), ROBOTS_MEET)
+        return trajectories, ""
+    return (), ROBOTS_MEET
 
 
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
@@ -225,25 +213,6 @@ def _on_its_way(problem: Problem, task: RobotTask, drive: Drive) -> str:
     target = int(task.path.target[ahead[0]]) if len(ahead) else len(places)
     name = places[target].id if target < len(places) else "where it must end"
     return f"on its way to {name}"
-
-
-def cost_maps_of(problem: Problem) -> list[CostMap]:
-    """Return what each robot's paths are priced on."""
-    smooth = smooth_terrain(problem.mission.terrain.multiplier)
-    fleet = problem.mission.fleet
-    # A radian of robots that slow down for it takes as long as so much way.
-    top, rate = fleet["limit"][:, 1], fleet["limit"][:, 2]
-    turning_m = np.where(fleet["model"] == UNICYCLE, top / rate, 0.0)
-    cost_maps = []
-    for r, robot in enumerate(problem.scene.robots):
-        share = energy_share(problem.preference.driving, robot)
-        cost_map = cost_map_of(problem, r, smooth)
-        if share < 1.0:
-            worth = share * cost_map.multiplier + (1.0 - share)
-            scrub = float(share * cost_map.scrub + (1.0 - share) * turning_m[r])
-            cost_map = cost_map._replace(multiplier=worth, scrub=scrub)
-        cost_maps.append(cost_map)
-    return cost_maps
 
 
 def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:

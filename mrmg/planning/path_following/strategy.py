@@ -7,7 +7,6 @@ they must leave in batteries.
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -125,24 +124,12 @@ def path_following(problem: Problem, request: Request) -> Attempt:
     """Follow paths along tours; where that fails, search for motions along others."""
     schedule = Schedule.of(problem, request.params, request.number)
     problem = problem.with_limit(schedule.time_share)
-    tries = _tries(problem, request, schedule)
-    routing_s, tours_found, blocked = 0.0, False, ""
-    counts: Counter[str] = Counter()
-    found = Attempt()
-    for found in tries:
-        routing_s += found.routing_s
-        counts.update(found.counts)
-        tours_found |= found.tours_found
-        blocked = found.blocked or blocked
+    found = Attempt(tours_found=False)
+    for tried in _tries(problem, request, schedule):
+        found = tried.after(found)
         if found.plans or request.halted:
             break
-    return replace(
-        found,
-        routing_s=routing_s,
-        counts=counts,
-        tours_found=tours_found,
-        blocked=blocked,
-    )
+    return found
 
 
 def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:

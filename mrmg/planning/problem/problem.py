@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,23 +151,18 @@ class Problem:
             for robot, tour in zip(self.scene.robots, tours, strict=True)
         }
 
+    def with_routing(self, **arrays: Any) -> Problem:
+        """Return the problem with other arrays of its routing problem."""
+        routing = self.mission.routing._replace(**arrays)
+        return replace(self, mission=self.mission._replace(routing=routing))
+
     def with_margin(self, margin: float) -> Problem:
         """Return the problem with another surcharge on the roadmap's energies."""
         routing = self.mission.routing
         share = (1.0 + margin) / (1.0 + self.route_margin)
-        return replace(
-            self,
-            mission=self.mission._replace(
-                routing=routing._replace(
-                    cost=routing.cost * share,
-                    escape=routing.escape * share,
-                    finish=routing.finish * share,
-                    time=routing.time * share,
-                    finish_time=routing.finish_time * share,
-                ),
-            ),
-            route_margin=margin,
-        )
+        names = ("cost", "escape", "finish", "time", "finish_time")
+        grown = {name: share * getattr(routing, name) for name in names}
+        return replace(self.with_routing(**grown), route_margin=margin)
 
     def with_soc_margin(self, share: float) -> Problem:
         """Return the problem whose plans leave more in batteries than the reserve.
@@ -183,9 +178,7 @@ class Problem:
 
     def with_limit(self, share: float) -> Problem:
         """Return the problem with routes that take a share of the time limit."""
-        routing = self.mission.routing
-        shorter = routing._replace(limit=share * routing.limit)
-        return replace(self, mission=self.mission._replace(routing=shorter))
+        return self.with_routing(limit=share * self.mission.routing.limit)
 
 
 def state_problem(

@@ -44,9 +44,13 @@ def time_counts(scene: Scene) -> bool:
 
     Where it is worth less, a slow manoeuvre that saves a little way pays.
     """
+    return _mean_share(scene) < TIMED_SHARE
+
+
+def _mean_share(scene: Scene) -> float:
+    """Return the mean of the robots' shares of driving."""
     driving = Preference.of(scene).driving
-    shares = [energy_share(driving, robot) for robot in scene.robots]
-    return float(np.mean(shares)) < TIMED_SHARE
+    return float(np.mean([energy_share(driving, robot) for robot in scene.robots]))
 
 
 def brakes_hard(objective: Objective, robot: Robot) -> bool:
@@ -67,9 +71,7 @@ def priced_world(scene: Scene, world: World) -> World:
     It is the world itself where only energy counts, and on slopes, where ways are what
     energy makes them.
     """
-    driving = Preference.of(scene).driving
-    shares = [energy_share(driving, robot) for robot in scene.robots]
-    share = float(np.mean(shares))
+    share = _mean_share(scene)
     if share == 1.0 or scene.elevation is not None:
         return world
     multiplier = share * world.terrain.multiplier + (1.0 - share)

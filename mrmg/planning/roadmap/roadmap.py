@@ -12,7 +12,7 @@ descends and the distance matrix the router needs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -132,26 +132,27 @@ def build_roadmap(
     leaving = left, len(vertex) - len(left) + np.arange(len(left))
     height_m = None if scene.elevation is None else height_at(scene, vertex)
     ends = _candidate_edges(vertex, neighbours)
-    paths = [
-        _cheapest_paths(scene, world, one, vertex, ends, leaving, height_m)
-        for one in classes
-    ]
+    edges, cost, successor, energy, distance = zip(
+        *(
+            _cheapest_paths(scene, world, one, vertex, ends, leaving, height_m)
+            for one in classes
+        ),
+        strict=True,
+    )
     slopes = [one.slope for one in classes]
     return Roadmap(
         arrays=RoadmapArrays(
             vertex=vertex,
-            cost_to_go=_stacked([one.cost for one in paths]),
-            successor=_stacked([one.successor for one in paths]),
+            cost_to_go=_stacked(cost),
+            successor=_stacked(successor),
             slope_refund=np.array([slope.refund for slope in slopes]),
             buckets=_buckets(vertex, scene.bounds[:2], scene.bounds[2:], BUCKET_M),
         ),
-        distance=np.array([one.distance for one in paths]).reshape(
-            len(classes), n_targets, n_targets
-        ),
+        distance=np.array(distance).reshape(len(classes), n_targets, n_targets),
         start_distance=np.stack(
-            [paths[c].energy[:, v] for c, v in zip(class_of_robot, starts, strict=True)]
+            [energy[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
-        edges=tuple(one.edges for one in paths),
+        edges=edges,
         targets=(
             *(target.id for target in scene.targets()),
             *(f"finish of {robot.id}" for robot in scene.robots if robot.finish),
@@ -173,23 +174,6 @@ def _ways_begin_at(
     )
 
 
-class _Paths(NamedTuple):
-    """The cheapest paths of a travel class to all targets.
-
-    Attributes:
-        edges: (first, second) vertex and cost there and back.
-        cost, successor: of each vertex's path to each target, shape (T, V).
-        energy: what the paths really take, shape (T, V).
-        distance: that of the paths from target to target, shape (T, T).
-    """
-
-    edges: tuple[np.ndarray, np.ndarray, np.ndarray]
-    cost: np.ndarray
-    successor: np.ndarray
-    energy: np.ndarray
-    distance: list[np.ndarray]
-
-
 def _cheapest_paths(
     scene: Scene,
     world: World,
@@ -198,8 +182,17 @@ def _cheapest_paths(
     ends: tuple[np.ndarray, np.ndarray],
     leaving: tuple[np.ndarray, np.ndarray],
     height_m: np.ndarray | None,
-) -> _Paths:
-    """Weigh candidate edges for a travel class, and find its cheapest paths."""
+) -> tuple[
+    tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]
+]:
+    """Weigh candidate edges for a travel class, and find its cheapest paths.
+
+    Returns:
+        (edges, cost, successor, energy, distance): first and second vertex of edges
+        and cost there and back; of each vertex's path to each target, shape (T, V), and
+        what the paths really take, likewise; and that of the paths from target to
+        target, shape (T, T).
+    """
     weight = np.concatenate(
         [
             edge_costs(world, travel_class, vertex, ends),
@@ -220,13 +213,8 @@ def _cheapest_paths(
         )
         successor[t] = np.maximum(before, -1)
     energy = _with_potential(cost, height_m, travel_class.slope.refund)
-    return _Paths(
-        edges=(low, high, weight),
-        cost=cost,
-        successor=successor,
-        energy=energy,
-        distance=[energy[:, sources].min(axis=1) for sources in entries],
-    )
+    distance = [energy[:, sources].min(axis=1) for sources in entries]
+    return (low, high, weight), cost, successor, energy, distance
 
 
 def edge_costs(
@@ -256,7 +244,7 @@ def edge_costs(
     return cost
 
 
-def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
+def _stacked(arrays: tuple[np.ndarray, ...]) -> np.ndarray:
     """Return arrays as one; a single one is not copied, as it may be large."""
     return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
 

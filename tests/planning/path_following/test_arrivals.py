@@ -11,8 +11,8 @@ import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following.arrivals import with_arrivals
 from mrmg.planning.path_following.band import smooth_path
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.following import tour_path
-from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene

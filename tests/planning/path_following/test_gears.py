@@ -12,9 +12,9 @@ import pytest
 
 from mrmg.planning import PlannerParams
 from mrmg.planning.path_following.band import SPACINGS_M, Path, smooth_path
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.following import tour_path
 from mrmg.planning.path_following.gears import WORTH_M_S, with_best_gears
-from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 

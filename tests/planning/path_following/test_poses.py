@@ -19,8 +19,8 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following import _pose_kernels, poses
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination.fields import Fields
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.poses import HEADINGS, posed
-from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene

@@ -9,8 +9,8 @@ import pytest
 
 from mrmg.planning import PlannerParams
 from mrmg.planning.path_following.band import SPACINGS_M
+from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.following import tour_path
-from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.types import Scene
