@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.document import WRITTEN, entries_by_value, entry_of
-from mrmg.scene.loading.faults import unknown_key, unknown_robot
+from mrmg.scene.loading.faults import unknown_robot
 from mrmg.scene.loading.reading import scene_from_document
-from mrmg.scene.loading.schema import RobotEntry, SceneDocument
+from mrmg.scene.loading.schema import BatteryEntry, RobotEntry, SceneDocument
 from mrmg.scene.types import Scene
 
 _Entry = dict[str, Any]
@@ -28,7 +29,6 @@ def changed_scene(
         SceneError: naming every fault, unknown keys among them.
     """
     source = f"{scene.name} with {', '.join(changes) or 'no change'}"
-    _refuse_unknown(changes, set(SceneDocument.model_fields) - {"format"}, source, "")
     before = scene.document
     given = _plain(changes, entries_by_value(scene, before))
     document = before | given
@@ -58,14 +58,13 @@ def changed_robot(
     if robot_id not in names:
         raise SceneError(source, [Fault("robots", unknown_robot(robot_id, names))])
     place = names.index(robot_id)
-    _refuse_unknown(changes, RobotEntry.model_fields, source, f"robots.{place}.")
     document = scene.document
     entry = document["robots"][place]
     given = _plain(changes, {})
     if isinstance(given.get("battery"), dict):
         own = entry.get("battery", {})
         given["battery"] = _merged_battery(own, given["battery"])
-    document["robots"][place] = _without_none(entry | given)
+    document["robots"][place] = _without_none(entry | given, RobotEntry)
     return _checked(scene, document, source, trust_code)
 
 
@@ -77,24 +76,11 @@ def _checked(scene: Scene, document: _Entry, source: str, trust_code: bool) -> S
         isinstance(robot, dict) and robot.get("model") in known for robot in robots
     )
     return scene_from_document(
-        _without_none(document),
+        _without_none(document, SceneDocument),
         source=source,
         base=scene.written.base if scene.written else None,
         trust_code=trust_code or (scene.has_custom_motion and same),
     )
-
-
-def _refuse_unknown(
-    changes: Iterable[str], known: Iterable[str], source: str, prefix: str
-) -> None:
-    names = set(known)
-    faults = [
-        Fault(f"{prefix}{key}", unknown_key(key, names))
-        for key in changes
-        if key not in names
-    ]
-    if faults:
-        raise SceneError(source, faults)
 
 
 def _plain(value: Any, written: Mapping[int, _Entry]) -> Any:
@@ -119,7 +105,7 @@ def _merged_battery(battery: _Entry, given: Any) -> Any:
     """Return a battery's entry with what is given in place of what it named."""
     if not isinstance(given, dict):
         return given  # and the loader reports what is wrong
-    return _without_none(_kept(battery, given) | given)
+    return _without_none(_kept(battery, given) | given, BatteryEntry)
 
 
 def _kept(battery: _Entry, given: _Entry) -> _Entry:
@@ -137,5 +123,11 @@ def _without_own(robot: _Entry, given: Any) -> _Entry:
     return {**robot, "battery": _kept(robot["battery"], given)}
 
 
-def _without_none(entry: _Entry) -> _Entry:
-    return {key: value for key, value in entry.items() if value is not None}
+def _without_none(entry: _Entry, model: type[BaseModel]) -> _Entry:
+    """Return an entry without the keys that are taken back; unknown ones stay."""
+    known = model.model_fields
+    return {
+        key: value
+        for key, value in entry.items()
+        if value is not None or key not in known
+    }

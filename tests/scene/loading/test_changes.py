@@ -149,8 +149,10 @@ def test_a_relief_goes_with_new_bounds() -> None:
     ("changes", "message"),
     [
         ({"time_limit_s": 5}, r"time_limit_s: unknown key \(did you mean 'time_limit'"),
+        ({"time_limit_s": None}, r"time_limit_s: unknown key \(did you"),
         ({"batery": {}}, r"batery: unknown key \(did you mean 'battery'"),
         ({"battery": {"capacity": 3}}, r"battery.capacity: unknown key"),
+        ({"battery": {"capacity": None}}, r"battery.capacity: unknown key"),
         ({"battery": 300}, "expected a mapping with keys"),
         ({"goals": [{"id": "r1", "circle": {}}]}, "goals.0"),
         ({"robots": [{"id": "a", "model": "cat", "pose": [1, 1, 0]}]}, "mean 'car'"),
@@ -167,7 +169,8 @@ def test_faults_are_those_of_files(changes: dict[str, Any], message: str) -> Non
     ("robot", "changes", "message"),
     [
         ("r3", {}, "no robot 'r3'.*; robots: r1, r2"),
-        ("r2", {"position": [1, 1, 0]}, r"robots.1.position: unknown key"),
+        ("r2", {"position": [1, 1, 0]}, r"robots.1.position \(r2\): unknown key"),
+        ("r2", {"position": None}, r"robots.1.position \(r2\): unknown key"),
         ("r1", {"pose": [20, 15, 0]}, "starts on the obstacle 'obstacle_0'"),
         ("r1", {"model": {"mass": 3}}, "robots.0.model.*like"),
         ("r1", {"model": {"like": "car", "masss": 3}}, "did you mean 'mass'"),
