@@ -47,8 +47,7 @@ def make_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"mrmg {__version__}")
     verbs = parser.add_verbs()
-    _add_planning(verbs)
-    _add_steps(verbs)
+    _add_run_verbs(verbs)
     robustness_commands.add_robustness(verbs)
     campaign_command.add_campaign(verbs)
     replay_command.add_replay(verbs)
@@ -73,27 +72,11 @@ def make_parser() -> Parser:
     return parser
 
 
-def _add_planning(verbs: Any) -> None:
-    planning = {
+def _add_run_verbs(verbs: Any) -> None:
+    """Add the verbs that make a run, and those that make a step of one anew."""
+    steps = {
         "run": ("the whole mission, from scene to report", commands.run, "summary"),
         "plan": ("plan only", commands.plan, "planning"),
-    }
-    for name, (what, command, output) in planning.items():
-        verb = verbs.add_parser(name, help=what, command=command)
-        verb.add_argument(
-            "scene", metavar="SCENE", help="path, or name of a shipped scene"
-        )
-        verb.add_out("DIR", "run folder; default runs/SCENE-sN", short=False)
-        verb.add_overwrite("another plan, drive or video")
-        add_options(verb, name)
-        verb.add_trust()
-        verb.add_json(f"{output}.json alone")
-        if name == "run":
-            verb.add_flag("--no-video", "leave out the video")
-
-
-def _add_steps(verbs: Any) -> None:
-    steps = {
         "verify": ("judge the plan of a run folder", commands.verify, "verdict"),
         "execute": ("drive the plan in MuJoCo", commands.execute, "log"),
         "audit": ("compare planned and driven energy", commands.audit, "audit"),
@@ -101,7 +84,14 @@ def _add_steps(verbs: Any) -> None:
     }
     for name, (what, command, output) in steps.items():
         verb = verbs.add_parser(name, help=what, command=command)
-        verb.add_run()
+        if name in ("run", "plan"):
+            verb.add_argument(
+                "scene", metavar="SCENE", help="path, or name of a shipped scene"
+            )
+            verb.add_out("DIR", "run folder; default runs/SCENE-sN", short=False)
+            verb.add_overwrite("another plan, drive or video")
+        else:
+            verb.add_run()
         if name == "execute":
             verb.add_out(
                 "DIR",
@@ -113,3 +103,5 @@ def _add_steps(verbs: Any) -> None:
         add_options(verb, name)
         verb.add_trust()
         verb.add_json(f"{output}.json alone")
+        if name == "run":
+            verb.add_flag("--no-video", "leave out the video")
