@@ -72,7 +72,28 @@ def campaign(options: argparse.Namespace) -> None:
         options.file, trust_code=options.trust_code, with_runs=options.runs
     )
     folder = options.out or Path("campaigns") / found.name
-    report = _Progress(len(found.trials))
+    reached = f"0 of {counted(len(found.trials), 'trial')}"
+    printed_s = time.monotonic()
+
+    def report(
+        bar: Callable[[float, str], None] | None,
+        done: int,
+        trials: int,
+        feasible: int,
+        left_s: float | None,
+    ) -> None:
+        """Show that one more trial is done; on a line now and then, off a terminal."""
+        nonlocal reached, printed_s
+        reached = f"{done} of {counted(trials, 'trial')}"
+        text = f"{reached}, {feasible} feasible"
+        text += f", {terminal.about(left_s)} left" if left_s else ""
+        now_s = time.monotonic()
+        if bar is not None:
+            bar(done / trials, text)
+        elif left_s is not None and now_s - printed_s > _LINE_EVERY_S:
+            printed_s = now_s
+            print(f"mrmg: {text}", file=sys.stderr)
+
     if options.engine == "local":
         arguments = {
             (each.profile, each.planner): each
@@ -90,39 +111,10 @@ def campaign(options: argparse.Namespace) -> None:
                 on_trial=partial(report, on_progress),
             )
     except KeyboardInterrupt:
-        print(f"mrmg: done and kept in {folder}: {report.done}", file=sys.stderr)
+        print(f"mrmg: done and kept in {folder}: {reached}", file=sys.stderr)
         raise
     lines = [*_lines(figures), *_places(folder, options.parquet)]
     terminal.print_result(options, figures, lines)
-
-
-class _Progress:
-    """Shows how far a campaign has got, and keeps it in words as `done`."""
-
-    def __init__(self, trials: int) -> None:
-        self.done = f"0 of {counted(trials, 'trial')}"
-        self._printed = time.monotonic()
-
-    def __call__(
-        self,
-        report: Callable[[float, str], None] | None,
-        done: int,
-        trials: int,
-        feasible: int,
-        left_s: float | None,
-    ) -> None:
-        """Show that one more trial is done; on a line now and then, off a terminal."""
-        self.done = f"{done} of {counted(trials, 'trial')}"
-        text = f"{self.done}, {feasible} feasible"
-        if left_s:
-            text += f", {terminal.about(left_s)} left"
-        if report is not None:
-            report(done / trials, text)
-            return
-        now = time.monotonic()
-        if left_s is not None and now - self._printed > _LINE_EVERY_S:
-            self._printed = now
-            print(f"mrmg: {text}", file=sys.stderr)
 
 
 def _lines(figures: dict[str, Any]) -> Iterator[str]:
