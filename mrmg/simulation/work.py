@@ -26,7 +26,7 @@ from scipy.sparse import csc_array
 
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS
-from mrmg.scene.loading.force_drive import is_metered, transmission
+from mrmg.scene.loading.force_drive import is_metered, tendon_moment, transmission
 from mrmg.scene.types import Robot
 
 BALANCE_TERMS = ("steering", "kinetic", "potential", "joints", "contacts")
@@ -63,7 +63,7 @@ class WorkMeter:
         roots = [model.body(f"{robot.id}/{CHASSIS}").rootid[0] for robot in robots]
         self._roots = np.array(roots)[:, None]
         own = (model.body_rootid[model.dof_bodyid] == self._roots).astype(float)
-        tendon = _tendon_moment(model)
+        tendon = tendon_moment(model)
         self._by_robot, self._tendons = _row_sums(own), _row_sums(tendon)
         self._rubbed_by_robot = _row_sums(
             np.concatenate([own, (own @ np.abs(tendon.T) > 0.0).astype(float)], axis=1)
@@ -202,15 +202,3 @@ def _row_sums(matrix: np.ndarray) -> np.ndarray | csc_array:
     """
     turned = np.ascontiguousarray(matrix.T, dtype=float)
     return turned if turned.size <= _DENSE_SIZE else csc_array(turned)
-
-
-def _tendon_moment(model: mujoco.MjModel) -> np.ndarray:
-    """Return what joint velocities make of fixed tendons' velocities, (ntendon, nv)."""
-    moment = np.zeros((model.ntendon, model.nv))
-    for tendon in range(model.ntendon):
-        first = model.tendon_adr[tendon]
-        for wrap in range(first, first + model.tendon_num[tendon]):
-            if model.wrap_type[wrap] == mujoco.mjtWrap.mjWRAP_JOINT:
-                dof = model.jnt_dofadr[model.wrap_objid[wrap]]
-                moment[tendon, dof] = model.wrap_prm[wrap]
-    return moment

@@ -9,16 +9,19 @@ from mrmg.mujoco_import import mujoco
 
 def transmission(model: mujoco.MjModel) -> np.ndarray:
     """Return what joint velocities make of actuators' velocities, shape (nout, nv)."""
-    still = mujoco.MjData(model)
-    mujoco.mj_forward(model, still)
-    moment = np.zeros((model.nout, model.nv))
-    mujoco.mju_sparse2dense(
-        moment,
-        still.actuator_moment,
-        still.moment_rownnz,
-        still.moment_rowadr,
-        still.moment_colind,
-    )
+    still = _at_rest(model)
+    layout = still.moment_rownnz, still.moment_rowadr, still.moment_colind
+    return _dense(model, still.actuator_moment, *layout)
+
+
+def tendon_moment(model: mujoco.MjModel) -> np.ndarray:
+    """Return what joint velocities make of tendons' velocities, shape (ntendon, nv).
+
+    Rows of tendons that are not fixed, whose moments change as joints move, are 0.
+    """
+    layout = model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind
+    moment = _dense(model, _at_rest(model).ten_J, *layout)
+    moment[model.wrap_type[model.tendon_adr] != mujoco.mjtWrap.mjWRAP_JOINT] = 0.0
     return moment
 
 
@@ -53,6 +56,21 @@ def drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
         ),
     }
     return next((text for text, is_so in faults.items() if is_so), "")
+
+
+def _at_rest(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+def _dense(
+    model: mujoco.MjModel, values: np.ndarray, *layout: np.ndarray
+) -> np.ndarray:
+    """Return a sparse matrix of MuJoCo's with one column for each degree of freedom."""
+    matrix = np.zeros((len(layout[0]), model.nv))
+    mujoco.mju_sparse2dense(matrix, values, *layout)
+    return matrix
 
 
 def _transmission_fault(model: mujoco.MjModel, index: int) -> str:

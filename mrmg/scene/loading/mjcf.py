@@ -16,10 +16,7 @@ import numpy as np
 
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, FLOOR_BIT, OBSTACLE_BIT, ROOT
-from mrmg.scene.loading.force_drive import drive_fault, transmission
-
-_TURNED_RAD = 1.0
-"""By which a wheel is turned to see how long that makes a tendon."""
+from mrmg.scene.loading.force_drive import drive_fault, tendon_moment, transmission
 
 
 @contextmanager
@@ -210,16 +207,8 @@ class CompiledRobot:
 
     def tendon_per_rad_m(self, tendon: str, joint: str) -> float:
         """Return by how much a tendon grows when a wheel turns by one radian."""
-        length_m = self._data.tendon(tendon).length
-        before_m = float(length_m[0])
-        self._turn(joint, _TURNED_RAD)
-        grown_m = float(length_m[0]) - before_m
-        self._turn(joint, -_TURNED_RAD)
-        return grown_m / _TURNED_RAD
-
-    def _turn(self, joint: str, angle_rad: float) -> None:
-        self._data.joint(joint).qpos[0] += angle_rad
-        mujoco.mj_fwdPosition(self._model, self._data)
+        dof = self._model.joint(joint).dofadr[0]
+        return float(tendon_moment(self._model)[self._model.tendon(tendon).id, dof])
 
     def _tyres(self, joint: str | int) -> list[int]:
         """Return the geoms of a wheel that touch the floor."""
