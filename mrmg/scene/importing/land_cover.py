@@ -16,7 +16,7 @@ from mrmg.scene.importing.layers import Area, Box, Layer
 from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import Positive, Strict
-from mrmg.scene.loading.yaml_text import parse_yaml, read_text
+from mrmg.scene.loading.yaml_text import read_yaml
 
 OBSTACLE = "obstacle"
 """What the table states of classes that robots must keep off."""
@@ -45,9 +45,8 @@ def read_classes(path: Path | None, source: str) -> dict[str, Any]:
             f"{source} is land cover: state what its classes are by --classes FILE"
         )
         raise UsageError(f"{message}, lines as '30: {{multiplier: 1.5}}'")
-    text = read_text(path, source=str(path))
+    document = read_yaml(path, source=str(path))
     with lines_of(path):
-        document = parse_yaml(text, source=str(path), keys_as_text=True)
         if not isinstance(document, dict) or not document:
             message = "expected lines 'class: {multiplier: 1.5}' or 'class: obstacle'"
             raise SceneError(str(path), [Fault("", message)])

@@ -2,7 +2,8 @@
 
 PyYAML follows YAML 1.1: `1e3` is a string, `no` is False, `010` is 8, `1:30` is 90, and
 a key given twice silently keeps the last value. Here scalars follow the core schema of
-YAML 1.2, and a repeated key is refused.
+YAML 1.2, keys are taken as they are written: `10: x` has the key "10", and a repeated
+one is refused.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
     """A safe loader with the scalars of YAML 1.2's core schema."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
-    keys_as_text = False
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         try:
@@ -49,16 +49,14 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
     ) -> dict[Any, Any]:
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if self.keys_as_text and isinstance(key_node, yaml.ScalarNode):
-                key = key_node.value
-            if not isinstance(key, str):
+            key, fault = key_node.value, ""
+            if not isinstance(key_node, yaml.ScalarNode):
+                fault = f"a key is a {key_node.id}; expected text"
+            elif key in mapping:
+                fault = f"the key '{key}' is given twice"
+            if fault:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key!r} is not text", key_node.start_mark
-                )
-            if key in mapping:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key '{key}' is given twice", key_node.start_mark
+                    None, None, fault, key_node.start_mark
                 )
             mapping[key] = self.construct_object(value_node, deep=deep)
         return mapping
@@ -120,7 +118,6 @@ class _FastLoader(Composer, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # t
 
     yaml_implicit_resolvers = _CoreLoader.yaml_implicit_resolvers
     yaml_constructors = _CoreLoader.yaml_constructors
-    keys_as_text = False
     construct_mapping = _CoreLoader.construct_mapping
 
     def __init__(self, stream: str) -> None:
@@ -153,20 +150,18 @@ def read_text(path: Path, *, source: str) -> str:
         raise SceneError(source, [Fault("", message)]) from error
 
 
-def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
+def parse_yaml(text: str, *, source: str) -> Any:
     """Turn YAML text into plain data.
 
     Args:
         text: the YAML.
         source: what error messages call it.
-        keys_as_text: whether keys are taken as they are written: `10: x` has the key
-            "10".
 
     Raises:
         SceneError: if it is no YAML; names the line and column.
     """
     try:
-        document = _loaded(text, keys_as_text)
+        document = _loaded(text)
         if "*" in text and _repeated(document, {}) > MAX_ALIASED_VALUES:
             message = f"aliases repeat more than {MAX_ALIASED_VALUES} values"
             raise SceneError(source, [Fault("", f"{message}; write them out")])
@@ -184,13 +179,10 @@ def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
         raise SceneError(source, [Fault("", "nested too deeply")]) from error
 
 
-def _loaded(text: str, keys_as_text: bool) -> Any:
-    if not keys_as_text:
-        with suppress(*UNREADABLE, yaml.YAMLError):  # read again for the message
-            return yaml.load(text, Loader=_FastLoader)  # noqa: S506 (a safe loader)
-    loader = _CoreLoader(text)
-    loader.keys_as_text = keys_as_text
-    return loader.get_single_data()
+def _loaded(text: str) -> Any:
+    with suppress(*UNREADABLE, yaml.YAMLError):  # read again for the message
+        return yaml.load(text, Loader=_FastLoader)  # noqa: S506 (a safe loader)
+    return yaml.load(text, Loader=_CoreLoader)  # noqa: S506 (a safe loader)
 
 
 def _repeated(value: Any, sizes: dict[int, float]) -> float:

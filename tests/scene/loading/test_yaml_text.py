@@ -50,6 +50,17 @@ def test_duplicate_key_is_refused_with_its_place() -> None:
         parse_yaml("a: 1\nb: 2\na: 3\n", source="test")
 
 
+def test_keys_are_taken_as_they_are_written() -> None:
+    read = parse_yaml("010: a\n1e3: b\n~: c\nno: d\n", source="test")
+    assert read == {"010": "a", "1e3": "b", "~": "c", "no": "d"}
+
+
+@pytest.mark.parametrize("key", ["[a, b]", "{a: b}"])
+def test_other_keys_are_refused_with_their_place(key: str) -> None:
+    with pytest.raises(SceneError, match="line 2, column 3: a key is a .*; expected t"):
+        parse_yaml(f"a: 1\n? {key}\n: 3\n", source="test")
+
+
 PLAIN = st.recursive(
     st.none()
     | st.booleans()
