@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.loading.places import composed, id_at, line_at
+from mrmg.scene.loading.places import composed, id_at, line_at, value_at
 from mrmg.scene.loading.reading import scene_path
 from mrmg.scene.loading.shape_schema import MOST
 from mrmg.scene.loading.yaml_text import read_yaml
@@ -57,19 +57,10 @@ def heading_hints(source: str | Path) -> list[Fault]:
 def _angles(document: Any) -> Iterator[tuple[str, str, str, float]]:
     """Yield the angles of a document: path of entry, path in it, name, value."""
     for section, places in _ANGLES.items():
-        entries = _value(document, section)
+        entries = value_at(document, section)
         for index in range(len(entries) if isinstance(entries, list) else 0):
             for keys, name in places:
-                value = _value(entries[index], *keys)
+                value = value_at(entries[index], *keys)
                 if isinstance(value, int | float):
                     entry = f"{section}.{index}"
                     yield entry, ".".join(map(str, keys)), name, value
-
-
-def _value(document: Any, *keys: str | int) -> Any:
-    for key in keys:
-        try:
-            document = document[key]
-        except (IndexError, KeyError, TypeError):
-            return None
-    return document

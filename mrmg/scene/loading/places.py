@@ -80,10 +80,16 @@ def entry_at(path: str) -> tuple[str, int]:
 def id_at(document: dict[str, Any], path: str) -> str | None:
     """Return the id of the entry of a scene that a path leads into, if it has one."""
     section, index = entry_at(path)
-    items = document.get(section)
-    if not isinstance(items, list) or not 0 <= index < len(items):
-        return None
-    entry = items[index]
-    given = entry.get("id") if isinstance(entry, dict) else None
-    is_id = isinstance(given, str) and re.fullmatch(ID_PATTERN, given)
+    given = value_at(document, section, index, "id")
+    is_id = index >= 0 and isinstance(given, str) and re.fullmatch(ID_PATTERN, given)
     return given if is_id else None
+
+
+def value_at(document: Any, *keys: str | int) -> Any:
+    """Return what lies at the end of a path of keys and indices; None if nothing."""
+    for key in keys:
+        try:
+            document = document[key]
+        except (IndexError, KeyError, TypeError):
+            return None
+    return document
