@@ -11,7 +11,7 @@ tracking error without disturbances (`mrmg.planning.problem.openings`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
@@ -58,14 +58,8 @@ class Margins:
 
     def over(self, other: Margins) -> Margins:
         """Return these margins, with another's where these state none."""
-        return Margins(
-            obstacle_m=_first(self.obstacle_m, other.obstacle_m),
-            robot_m=_first(self.robot_m, other.robot_m),
-        )
-
-
-def _first(own: float | None, other: float | None) -> float | None:
-    return other if own is None else own
+        stated = {key: m for key, m in asdict(self).items() if m is not None}
+        return replace(other, **stated)
 
 
 STATES_NONE = Margins()
