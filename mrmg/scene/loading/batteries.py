@@ -46,14 +46,12 @@ def battery_of(
         message = f"got {found} J; must not be below the reserve, {least} J"
         raise EntryError(Fault(f"{path}.start_energy", message))
     power_W = own.charging_power or fleet.charging_power or math.inf
-    energy = model.energy_model
-    drawn_W = energy.idle_power_W + energy.device_power_W
-    least_W = drawn_W + capacity_J / LONGEST_STAY_S
+    least_W = model.consumers_W + capacity_J / LONGEST_STAY_S
     if power_W < least_W:
         message = (
-            f"got {power_W:g} W; {robot.id} itself draws {drawn_W:g} W at rest, and "
-            f"its battery of {capacity_J:.0f} J must be full within a day; give at "
-            f"least {math.ceil(100.0 * least_W) / 100.0:g} W"
+            f"got {power_W:g} W; {robot.id} itself draws {model.consumers_W:g} W at "
+            f"rest, and its battery of {capacity_J:.0f} J must be full within a day; "
+            f"give at least {math.ceil(100.0 * least_W) / 100.0:g} W"
         )
         where = f"{path}.battery" if own.charging_power else "battery"
         raise EntryError(Fault(f"{where}.charging_power", message))

@@ -195,9 +195,6 @@ def _from_picture(path: Path, name: str, span: list[float] | None) -> np.ndarray
 
 def _unpacked(rows: int, columns: int, text: str) -> np.ndarray:
     where = "elevation.packed.heights"
-    if rows * columns > MOST_NODES:
-        message = f"at most {MOST_NODES} heights in all"
-        raise EntryError(Fault("elevation.packed", message))
     inflate = zlib.decompressobj()
     try:
         data = inflate.decompress(base64.b64decode(text, validate=True), 4 * MOST_NODES)
@@ -205,7 +202,8 @@ def _unpacked(rows: int, columns: int, text: str) -> np.ndarray:
         message = f"got {shown(text)}; not what was once packed ({error})"
         raise EntryError(Fault(where, message)) from error
     if len(data) != 4 * rows * columns:
-        message = f"holds {len(data) // 4} heights; expected {rows} x {columns}"
+        expected = f"{rows} x {columns}, at most {MOST_NODES} in all"
+        message = f"holds {len(data) // 4} heights; expected {expected}"
         raise EntryError(Fault(where, message))
     return np.frombuffer(data, "<i4").reshape(rows, columns) * PACKED_M
 

@@ -185,6 +185,10 @@ def save(path: Path, name: str) -> None:
             {"packed": {"rows": 2, "columns": 2, "heights": "eJwDAAAAAAE="}},
             r"holds 0 heights; expected 2 x 2",
         ),
+        (
+            {"packed": {"rows": 2000, "columns": 2000, "heights": "eJwDAAAAAAE="}},
+            r"expected 2000 x 2000, at most 1000000 in all",
+        ),
         ({"hils": []}, r"did you mean 'hills'\?"),
         (
             {"grid": [[0, 0, 3], [0, 0, 3]]},
