@@ -15,7 +15,7 @@ from mrmg.plans import Plan, Visit
 from mrmg.runs.record import read_record
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.viz.activities import CHARGING, Activity, activities, breakdowns
+from mrmg.viz.activities import CHARGING, Activity, activities, breakdowns, stops_behind
 
 PATH_PERIOD_S = 0.1
 PATH_TOLERANCE_M = 0.01
@@ -71,9 +71,9 @@ class Course:
     @cached_property
     def target(self) -> np.ndarray:
         """The id of the next target of its tour; "" after the last, shape (n,)."""
-        steps = [visit.step for visit in self.visits]
-        done = np.searchsorted(steps, np.arange(len(self.time_s)), "right")
-        return np.array([*self.tour, ""])[np.minimum(done, len(self.tour))]
+        steps = np.arange(len(self.time_s))
+        stops = stops_behind(self.tour, self.visits, steps)
+        return np.array([*self.tour, ""]).take(stops)
 
 
 @dataclass(frozen=True, kw_only=True)

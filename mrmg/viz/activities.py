@@ -111,6 +111,25 @@ def legs_of_stops(tour: Iterable[str], visited: Sequence[str]) -> list[int | Non
     return legs
 
 
+def stops_behind(
+    tour: Sequence[str], visits: Sequence[Visit], steps: int | np.ndarray
+) -> np.ndarray:
+    """Return how many stops of its tour a robot has behind it, those missed included.
+
+    Args:
+        tour: ids of goals and stations.
+        visits: of this robot, in order.
+        steps: of its motion, shape (n,), or one step.
+
+    Returns:
+        One number for each step; a robot heads for the stop of that number.
+    """
+    legs = legs_of_stops(tour, [visit.target for visit in visits])
+    behind = np.array([0, *(legs.index(leg) + 1 for leg in range(len(visits)))])
+    done = np.searchsorted([visit.step for visit in visits], steps, "right")
+    return np.asarray(behind[done])
+
+
 def lengths_along(states: np.ndarray) -> np.ndarray:
     """Return the length of the path up to each state [m], shape (n,)."""
     steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)

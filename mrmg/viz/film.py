@@ -14,7 +14,7 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, legs_of_stops, standing_of
+from mrmg.viz.activities import breakdowns, standing_of, stops_behind
 from mrmg.viz.ground_image import PAINTED, GroundFrame, paint_trail, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading
@@ -125,9 +125,7 @@ class Film:
 
     def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
         tour = self.plan.tours.get(curve.robot, ())
-        legs = legs_of_stops(tour, [visit.target for visit in curve.visits])
-        done = sum(visit.step <= tick for visit in curve.visits)
-        stop = legs.index(done - 1) + 1 if done else 0
+        stop = int(stops_behind(tour, curve.visits, tick))
         if stop < len(tour):
             return self.names[tour[stop]]
         # The plan in force does not know where one was going that broke down.
