@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import shapely
 
-from mrmg.energy.battery_curves import shown_curves
+from mrmg.energy.battery_curves import BatteryCurve, shown_curves
 from mrmg.errors import Fault, RunFolderError
-from mrmg.plans import Plan, Visit
+from mrmg.plans import Plan
 from mrmg.runs.record import read_record
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.activities import CHARGING, Activity, activities, breakdowns, stops_behind
 
@@ -23,34 +23,23 @@ PATH_TOLERANCE_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class Course(BatteryCurve):
     """The motion of one robot: driven, or planned where nothing was driven.
 
     Attributes:
-        robot: who moves.
         tour: ids of its targets, in the order of its visits.
-        time_s: shape (n,).
-        state: x, y, theta, v and a fifth number, shape (n, 5).
-        content_J: of its battery, after a recharge, shape (n,).
-        visits: that it made.
         activities: what it does, span by span.
         broken_s: when it broke down; None if it did not.
     """
 
-    robot: Robot
     tour: tuple[str, ...]
-    time_s: np.ndarray
-    state: np.ndarray
-    content_J: np.ndarray
-    visits: tuple[Visit, ...]
     activities: tuple[Activity, ...]
     broken_s: float | None
 
     @cached_property
     def charge(self) -> np.ndarray:
         """State of charge, 0..1, shape (n,)."""
-        share = self.content_J / self.robot.battery.capacity_J
-        return np.asarray(np.clip(share, 0.0, 1.0))
+        return np.clip(self.energy_J / self.battery.capacity_J, 0.0, 1.0)
 
     @cached_property
     def charging(self) -> np.ndarray:
@@ -101,10 +90,6 @@ class Mission:
     def time_s(self) -> np.ndarray:
         """Times of the states of all courses, shape (n,)."""
         return self.courses[0].time_s
-
-    def plan_time_s(self) -> np.ndarray:
-        """Return the time of the plan that the fleet had reached, shape (n,)."""
-        return self.time_s if self.log is None else self.log.clock_s
 
 
 def every(time_s: np.ndarray, period_s: float) -> np.ndarray:
@@ -162,12 +147,8 @@ def read_mission(run_folder: Path, *, trust_code: bool = False) -> Mission:
     broken_s = breakdowns(log)
     courses = [
         Course(
-            robot=scene.robot(curve.robot),
+            **{item.name: getattr(curve, item.name) for item in fields(BatteryCurve)},
             tour=plan.tours.get(curve.robot, ()),
-            time_s=curve.time_s,
-            state=curve.state,
-            content_J=curve.energy_J,
-            visits=curve.visits,
             activities=activities(
                 scene, curve, curve.visits, broken_s.get(curve.robot)
             ),

@@ -28,9 +28,9 @@ def files(mission: Mission, versions: tuple[str, ...] = ()) -> Files:
 
 
 def _rows(course: Course) -> list[tuple[object, ...]]:
-    numbers = [course.time_s, *course.state[:, :4].T, course.content_J, course.charge]
+    numbers = [course.time_s, *course.state[:, :4].T, course.energy_J, course.charge]
     columns = [(np.round(column, _DECIMALS) + 0.0).tolist() for column in numbers]
-    robots = [course.robot.id] * len(course.time_s)
+    robots = [course.robot] * len(course.time_s)
     return list(zip(robots, *columns, course.target.tolist(), strict=True))
 
 

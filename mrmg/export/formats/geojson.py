@@ -95,11 +95,11 @@ def _path(course: Course, motion: str) -> dict[str, Any]:
     at = np.resize(at, max(2, len(at)))  # a line has two points at least
     return _feature(
         shapely.LineString(course.state[at, :2]),
-        robot=course.robot.id,
+        robot=course.robot,
         motion=motion,
         tour=list(course.tour),
         time_s=np.round(course.time_s[at], 3).tolist(),
-        energy_J=np.round(course.content_J[at], 1).tolist(),
+        energy_J=np.round(course.energy_J[at], 1).tolist(),
     )
 
 

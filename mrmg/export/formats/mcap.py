@@ -109,14 +109,14 @@ def _metadata(mission: Mission) -> dict[str, str]:
 
 def _messages(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
     """Return all messages in the order of their times."""
-    names = ros_names(course.robot.id for course in mission.courses)
+    names = ros_names(course.robot for course in mission.courses)
     streams = [
         _still(ros, mission, names),
         _goals(ros, mission),
         _transforms(ros, mission, names),
     ]
     for course in mission.courses:
-        name = names[course.robot.id]
+        name = names[course.robot]
         streams += [
             _poses(ros, mission.scene, course, f"/{name}/pose"),
             _battery(ros, course, f"/{name}/battery"),
@@ -150,7 +150,7 @@ def _goals(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
     scene = mission.scene
     every_goal = goal_markers(ros, scene, [goal.id for goal in scene.goals])
     yield 0.0, "/goals", every_goal
-    robots = [course.robot.id for course in mission.courses]
+    robots = [course.robot for course in mission.courses]
     visits = [visit for course in mission.courses for visit in course.visits]
     for visit in sorted(visits, key=lambda visit: visit.time_s):
         if visit.kind == "goal":
@@ -167,7 +167,7 @@ def _transforms(
     """Yield the frames of all robots, each time all of them."""
     stamped = ros["geometry_msgs/TransformStamped"]
     transform = ros["geometry_msgs/Transform"]
-    frames = [f"{names[course.robot.id]}/base_link" for course in mission.courses]
+    frames = [f"{names[course.robot]}/base_link" for course in mission.courses]
     at = every(mission.time_s, TF_PERIOD_S)
     poses = [
         _ros_poses(mission.scene, course.state[at]).tolist()
@@ -196,7 +196,7 @@ def _poses(
 
 
 def _stamped(
-    ros: RosTypes, scene: Scene, motion: Course | Motion, at: np.ndarray
+    ros: RosTypes, scene: Scene, motion: Motion, at: np.ndarray
 ) -> Iterator[tuple[float, Any]]:
     """Yield times, and a robot's poses there, at indices of its states."""
     poses = _ros_poses(scene, motion.state[at]).tolist()
@@ -229,7 +229,7 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
             present=True,
             cell_voltage=none,
             cell_temperature=none,
-            location=course.robot.id,
+            location=course.robot,
             serial_number="",
         )
         yield time_s, topic, state

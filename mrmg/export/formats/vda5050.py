@@ -23,6 +23,7 @@ import numpy as np
 from mrmg.export.mission import Course, Mission, bends, every
 from mrmg.export.route import STANDING_M_S, Node, Route, route_of
 from mrmg.export.table import Files, Format
+from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Goal, Scene, Station
 from mrmg.viz.activities import lengths_along
 
@@ -60,11 +61,11 @@ def files(mission: Mission, versions: tuple[str, ...]) -> Files:
     """Return orders and states of all robots, for each version."""
     written: dict[str, bytes] = {}
     for course in mission.courses:
-        route = route_of(mission.scene, mission.plan, course.robot.id)
+        route = route_of(mission.scene, mission.plan, course.robot)
         order = _order(mission, course, route)
         states = list(_states(mission, course, route, order))
         for version in versions:
-            folder = f"vda5050/{version}/{course.robot.id}"
+            folder = f"vda5050/{version}/{course.robot}"
             text = json.dumps(_in_version(order, version), indent=1) + "\n"
             lines = [f"{json.dumps(_in_version(state, version))}\n" for state in states]
             contents = (text, "".join(lines))
@@ -115,24 +116,24 @@ def _header(course: Course, number: int, time_s: float) -> _Json:
         "timestamp": time_s,
         "version": "",
         "manufacturer": MANUFACTURER,
-        "serialNumber": course.robot.id,
+        "serialNumber": course.robot,
     }
 
 
 def _order(mission: Mission, course: Course, route: Route) -> _Json:
     """Return the order of a robot, all of which is released."""
-    plan = mission.plan
+    plan, model = mission.plan, mission.scene.robot(course.robot).model
     nodes = [
         _node(mission.scene, route, number, node)
         for number, node in enumerate(route.nodes)
     ]
     return {
         **_header(course, 0, 0.0),
-        "orderId": f"{plan.scene_name}-{plan.digest[:8]}-{course.robot.id}",
+        "orderId": f"{plan.scene_name}-{plan.digest[:8]}-{course.robot}",
         "orderUpdateId": 0,
         "nodes": nodes,
         "edges": [
-            _edge(course, 2 * number + 1, *edge)
+            _edge(model, 2 * number + 1, *edge)
             for number, edge in enumerate(route.edges())
         ],
     }
@@ -157,7 +158,7 @@ def _node(scene: Scene, route: Route, number: int, node: Node) -> _Json:
 
 
 def _edge(
-    course: Course, sequence: int, start: Node, end: Node, states: np.ndarray
+    model: RobotModel, sequence: int, start: Node, end: Node, states: np.ndarray
 ) -> _Json:
     """Return an edge that a robot drives along a path, forwards or backwards."""
     speed_m_s = states[:, 3]
@@ -174,7 +175,7 @@ def _edge(
         "maxSpeed": _rounded(np.abs(speed_m_s).max()),
         "orientation": _BACKWARDS if backwards else _FORWARDS,
         "orientationType": "TANGENTIAL",
-        "rotationAllowed": course.robot.model.motion_model != "car",
+        "rotationAllowed": model.motion_model != "car",
         "length": _rounded(lengths_m.sum()),
         "trajectory": {
             "degree": 1,
@@ -214,7 +215,7 @@ def _states(
     mission: Mission, course: Course, route: Route, order: _Json
 ) -> Iterator[_Json]:
     """Yield the states: one a second, and one whenever a node is reached or left."""
-    plan_s = mission.plan_time_s()
+    plan_s = mission.time_s if mission.log is None else mission.log.clock_s
     leave_s = np.array([node.leave_s for node in route.nodes])
     reached = np.searchsorted(plan_s, route.reached_s - _EPSILON_S)
     left = np.searchsorted(plan_s, leave_s - _EPSILON_S)
