@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from mrmg.extras import import_extra
 
 MAP_FRAME = "map"
@@ -34,6 +36,24 @@ class RosTypes:
     def __getitem__(self, name: str) -> Any:
         """Return the class of a type such as "geometry_msgs/Pose"."""
         return self._store.types[name.replace("/", "/msg/")]
+
+    def made(self, name: str, **known: Any) -> Any:
+        """Return a message of a type, blank (0, "" or empty) where nothing is known."""
+        kind = self[name]
+        blank = {
+            field: self._blank(*described)
+            for field, described in self._store.fielddefs[kind.__msgtype__][1]
+            if field not in known
+        }
+        return kind(**known, **blank)
+
+    def _blank(self, sort: Any, element: Any) -> Any:
+        """Return the blank value of a field from its description in `fielddefs`."""
+        if sort.name == "NAME":
+            return self.made(element.replace("/msg/", "/"))
+        if sort.name == "BASE":
+            return "" if element[0] == "string" else 0
+        return np.empty(0, dtype=np.uint8)
 
     def definition(self, kind: str) -> bytes:
         """Return the definition of a `__msgtype__`, and of the types in it."""

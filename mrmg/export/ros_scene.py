@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.export.ros_messages import MAP_FRAME, RosTypes
+from mrmg.export.ros_messages import RosTypes
 from mrmg.scene.types import Goal, Obstacle, Scene, Station
 from mrmg.simulation import palette
 from mrmg.simulation.convex import numbered, triangles, upright_solid
@@ -193,29 +193,15 @@ def _marker(
 ) -> Any:
     """Return a marker of the map's frame that stays."""
     scale_m = _LINE_M if kind == _LINE_STRIP else 1.0
-    file = ros["visualization_msgs/MeshFile"]("", np.empty(0, dtype=np.uint8))
-    header = ros.header(0.0)
-    image = ros["sensor_msgs/CompressedImage"](header, "", np.empty(0, dtype=np.uint8))
-    return ros["visualization_msgs/Marker"](
-        header=ros.header(0.0, MAP_FRAME),
+    return ros.made(
+        "visualization_msgs/Marker",
+        header=ros.header(0.0),
         ns=name,
-        id=0,
         type=kind,
-        action=0,
         pose=ros.pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
         scale=ros.vector(scale_m, scale_m, scale_m),
         color=_color(ros, color),
-        lifetime=ros["builtin_interfaces/Duration"](0, 0),
-        frame_locked=False,
         points=[ros.point(*point) for point in points.tolist()],
-        colors=[],
-        texture_resource="",
-        texture=image,
-        uv_coordinates=[],
-        text="",
-        mesh_resource="",
-        mesh_file=file,
-        mesh_use_embedded_materials=False,
     )
 
 

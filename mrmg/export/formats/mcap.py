@@ -209,12 +209,12 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
     """Yield the state of charge of a robot."""
     charging, discharging = 1, 2
     unknown = float("nan")
-    none = np.empty(0, dtype=np.float32)
     changes = np.flatnonzero(np.diff(course.charging.astype(int))) + 1
     ticks = np.union1d(every(course.time_s, BATTERY_PERIOD_S), changes)
     for at in ticks.tolist():
         time_s = float(course.time_s[at])
-        state = ros["sensor_msgs/BatteryState"](
+        state = ros.made(
+            "sensor_msgs/BatteryState",
             header=ros.header(time_s),
             voltage=unknown,
             temperature=unknown,
@@ -224,13 +224,8 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
             design_capacity=unknown,
             percentage=float(course.charge[at]),
             power_supply_status=charging if course.charging[at] else discharging,
-            power_supply_health=0,
-            power_supply_technology=0,
             present=True,
-            cell_voltage=none,
-            cell_temperature=none,
             location=course.robot,
-            serial_number="",
         )
         yield time_s, topic, state
 
