@@ -27,7 +27,7 @@ _LIFT_M = 0.02
 _LETTER_M = 0.8
 _OPEN_GOAL = (1.0, 1.0, 1.0)
 _LINE_M = 0.15
-_CYLINDER, _LINE_STRIP, _TEXT, _TRIANGLES = 3, 4, 9, 11
+_LINE_STRIP, _TEXT, _TRIANGLES = 4, 9, 11
 """Types of markers."""
 
 
@@ -55,12 +55,8 @@ def occupancy_grid(ros: RosTypes, scene: Scene) -> Any:
 
 def scene_markers(ros: RosTypes, scene: Scene) -> Any:
     """Return bounds, ground or terrain, obstacles and stations."""
-    x_min, y_min, x_max, y_max = scene.bounds
-    ring = np.array(
-        [(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max), (x_min, y_min)]
-    )
-    border = shapely.get_coordinates(shapely.segmentize(shapely.LineString(ring), 1.0))
-    line = lifted(scene, border, _LIFT_M)
+    border = shapely.segmentize(shapely.box(*scene.bounds).exterior, 1.0)
+    line = lifted(scene, shapely.get_coordinates(border), _LIFT_M)
     markers = [_marker(ros, "bounds", _LINE_STRIP, line, palette.WALL)]
     if scene.elevation is None:
         for area in scene.terrain:
@@ -129,15 +125,9 @@ def _target(
     color: palette.Rgb,
 ) -> Iterator[Any]:
     """Yield the region of a goal or station, and its name."""
-    name, region = f"{kind} {target.id}", target.region
-    if len(region.corners):
-        yield _flat(ros, scene, name, region.shape, color)
-    else:
-        disc = _marker(ros, name, _CYLINDER, np.empty((0, 3)), color)
-        disc.pose.position = ros.point(*lifted(scene, region.center, 0.0)[0].tolist())
-        disc.scale = ros.vector(2 * region.radius_m, 2 * region.radius_m, 2 * _LIFT_M)
-        yield disc
-    above = lifted(scene, region.center, _LETTER_M)[0]
+    name = f"{kind} {target.id}"
+    yield _flat(ros, scene, name, target.region.shape, color)
+    above = lifted(scene, target.region.center, _LETTER_M)[0]
     yield _text(ros, f"{name} name", above, target.id)
 
 
