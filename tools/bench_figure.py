@@ -158,8 +158,7 @@ def _draw_boxes(axes: Axes, rows: Sequence[BenchRow], key: Key) -> None:
     axes.set_xlim(-0.6, len(groups) - 0.4)
     axes.grid(axis="y", which="both", color="#E4E6EA", linewidth=0.5)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _draw_box(

@@ -102,5 +102,4 @@ def _draw_panel(axes: Axes, points: Sequence[GrowthPoint]) -> None:
     axes.set_xticks([], minor=True)
     axes.grid(axis="y", color="#E4E6EA", linewidth=0.5)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -56,8 +56,7 @@ def tidy(axes: Axes) -> None:
     """Give axes a pale grid behind their lines, and no frame above and on the right."""
     axes.grid(color="#E4E6EA", linewidth=0.7)
     axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def add_legend_above(figure: Figure, handles: Iterable[Artist]) -> None:

@@ -192,7 +192,8 @@ def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> 
 def _paint_rims(axes: Axes, scene: Scene) -> None:
     for target in scene.targets():
         _, rim = style.target_colors(target)
-        scene_drawing.draw_region(axes, target.region, "none", rim, _points(5.0))
+        look = {"facecolor": "none", "edgecolor": rim, "linewidth": _points(5.0)}
+        scene_drawing.add_shape(axes, target.region.shape, zorder=5, **look)
 
 
 def _points(pixels: float) -> float:

@@ -68,14 +68,15 @@ def draw_mission(
         scene_drawing.draw_path(axes, trajectory.state, color, style.PLANNED)
         _draw_arrows(axes, trajectory.state, color)
     if log is not None:
-        for robot, state in zip(log.robots, log.state, strict=True):
-            scene_drawing.draw_path(axes, state, colors[robot], style.DRIVEN)
+        for robot_id, state in zip(log.robots, log.state, strict=True):
+            scene_drawing.draw_path(axes, state, colors[robot_id], style.DRIVEN)
         for contact in log.contacts:
             _draw_cross(axes, contact.x_m, contact.y_m)
     _draw_targets(axes, scene, plan)
     if plan is not None:
         _draw_narrow(axes, plan)
-    scene_drawing.draw_robots(axes, scene)
+    for robot in scene.robots:
+        scene_drawing.draw_footprint(axes, robot, robot.pose, colors[robot.id])
     handles = _legend(scene, plan, log)
     scene_drawing.add_legend(axes, handles)
     em_m = scene_drawing.letter_m(axes)

@@ -16,7 +16,6 @@ from matplotlib.patheffects import withStroke
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from mrmg.scene.region import Region
 from mrmg.scene.types import Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
@@ -61,8 +60,7 @@ def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.tick_params(colors=style.MUTED, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    axes.spines[:].set_visible(False)
     return figure, axes
 
 
@@ -125,13 +123,13 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
         hatched: hatch the terrain classes.
     """
     bounds = box(*scene.bounds)
-    _add_shape(
+    add_shape(
         axes, bounds, facecolor=style.GROUND, edgecolor=style.OBSTACLE_EDGE, zorder=0
     )
     classes = style.terrain_classes(scene)
     for rank, area in enumerate(scene.terrain):
         look = classes[area.multiplier]
-        _add_shape(
+        add_shape(
             axes,
             area.shape.intersection(bounds),
             facecolor=look.color,
@@ -142,7 +140,7 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
         )
     for obstacle in scene.barriers:
         partial = obstacle.blocks is not None
-        _add_shape(
+        add_shape(
             axes,
             obstacle.shape,
             facecolor=style.obstacle_color(obstacle),
@@ -171,7 +169,8 @@ def draw_targets(
     for target in scene.targets():
         fill, edge = style.target_colors(target)
         fill = colors.get(target.id, fill)
-        draw_region(axes, target.region, fill, edge, 0.13 * points)
+        area = {"facecolor": fill, "edgecolor": edge, "linewidth": 0.13 * points}
+        add_shape(axes, target.region.shape, zorder=5, **area)
         if isinstance(target, Station):
             look = marker("s", 0.6 * points, fill, edge)
             rim = 0.1 * points
@@ -180,37 +179,16 @@ def draw_targets(
     for robot in scene.robots:
         if robot.finish:
             look = {"edgecolor": robots[robot.id], "linestyle": (0, (2, 1.5))}
-            _add_shape(axes, robot.finish.region.shape, fill=False, zorder=5, **look)
+            add_shape(axes, robot.finish.region.shape, fill=False, zorder=5, **look)
     for _, arrow, _ in wanted_headings(scene):
-        _add_shape(axes, arrow, facecolor=style.GOAL_EDGE, linewidth=0.0, zorder=5)
-
-
-def draw_region(
-    axes: Axes, region: Region, color: str, edge: str, linewidth: float
-) -> None:
-    """Draw a goal's or station's region."""
-    _add_shape(
-        axes,
-        region.shape,
-        facecolor=color,
-        edgecolor=edge,
-        linewidth=linewidth,
-        zorder=5,
-    )
-
-
-def draw_robots(axes: Axes, scene: Scene) -> None:
-    """Draw every robot's footprint at its start."""
-    colors = style.scene_robot_colors(scene)
-    for robot in scene.robots:
-        draw_footprint(axes, robot, robot.pose, colors[robot.id])
+        add_shape(axes, arrow, facecolor=style.GOAL_EDGE, linewidth=0.0, zorder=5)
 
 
 def draw_footprint(
     axes: Axes, robot: Robot, pose: tuple[float, float, float], color: str
 ) -> None:
     """Draw a robot's outline at a pose (x [m], y [m], yaw [rad])."""
-    _add_shape(
+    add_shape(
         axes,
         Polygon(robot.model.footprint_at(pose)),
         facecolor=color,
@@ -252,8 +230,8 @@ def _handle(entry: style.KeyEntry) -> Patch | Line2D:
     return marker_handle(entry.label, **look)
 
 
-def marker(shape: str, size: float, face: str, edge: str) -> dict[str, Any]:
-    """Return the look of a marker, as of matplotlib's `Line2D`."""
+def marker(shape: Any, size: float, face: str, edge: str) -> dict[str, Any]:
+    """Return the look of a marker, as of matplotlib's `Line2D`; `shape`, too."""
     return {
         "marker": shape,
         "markersize": size,
@@ -281,7 +259,8 @@ def add_legend(axes: Axes, handles: list[Patch | Line2D]) -> None:
     )
 
 
-def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
+def add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
+    """Draw the polygons of a geometry; `look` as of matplotlib's `PathPatch`."""
     for polygon in polygons_of(shape):
         rings = [polygon.exterior, *polygon.interiors]
         outline = Outline.make_compound_path(

@@ -59,8 +59,7 @@ def draw_timeline(
     axes.set_ylim(tops_in[-1], 0.0)
     axes.set_yticks(tops_in - _BAR_INCHES, [row.robot for row in rows])
     axes.set_xlabel("time [s]")
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right", "left"]].set_visible(False)
     axes.tick_params(axis="y", length=0)
     handles: list[Patch | Line2D] = [
         Patch(facecolor=style.MUTED, label="driving"),
