@@ -9,11 +9,10 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
 from print_style import COLUMN_IN, PAGE_IN, SMALL_PT, TEXT_PT, print_figure
 
-from mrmg.scene.types import Goal, Scene, Station
+from mrmg.scene.types import Scene, Station
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.map_labels import KINDS, map_labels
 
@@ -92,52 +91,27 @@ def prepare_map(axes: Axes, scene: Scene) -> None:
 
 def draw_targets(axes: Axes, scene: Scene) -> None:
     """Draw goals as circles and stations as squares, without names."""
-    looks = {
-        Goal: ("o", style.GOAL_OPEN, style.GOAL_EDGE),
-        Station: ("s", style.STATION, style.STATION_EDGE),
-    }
     for target in scene.targets():
-        shape, face, edge = looks[type(target)]
-        axes.plot(
-            *target.region.center,
-            marker=shape,
-            markersize=4.0,
-            markerfacecolor=face,
-            markeredgecolor=edge,
-            markeredgewidth=0.7,
-            zorder=6,
-        )
+        shape = "s" if isinstance(target, Station) else "o"
+        look = scene_drawing.marker(shape, 4.0, *style.target_colors(target))
+        axes.plot(*target.region.center, markeredgewidth=0.7, zorder=6, **look)
 
 
 def draw_starts(axes: Axes, scene: Scene) -> None:
     """Draw every robot's start as an arrowhead that points where the robot heads."""
-    for robot, color in zip(
-        scene.robots, style.scene_robot_colors(scene).values(), strict=True
-    ):
+    colors = style.scene_robot_colors(scene)
+    for robot in scene.robots:
         x_m, y_m, yaw = robot.pose
-        axes.plot(
-            x_m,
-            y_m,
-            marker=(3, 0, math.degrees(yaw) - 90.0),
-            markersize=_ROBOT_PT,
-            markerfacecolor=color,
-            markeredgecolor="white",
-            markeredgewidth=0.4,
-            zorder=9,
-        )
+        arrowhead = (3, 0, math.degrees(yaw) - 90.0)
+        look = scene_drawing.marker(arrowhead, _ROBOT_PT, colors[robot.id], "white")
+        axes.plot(x_m, y_m, markeredgewidth=0.4, zorder=9, **look)
 
 
 def problem_legend(scenes: Sequence[Scene]) -> list[Patch | Line2D]:
     """Return legend handles for all kinds of things that any of the scenes holds."""
-    start = Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=MarkerStyle((3, 0, -90.0)),
-        markersize=_ROBOT_PT / _MARKER_SCALE,
-        color=style.INK,
-        label="robot at its start",
-    )
+    size = _ROBOT_PT / _MARKER_SCALE
+    look = scene_drawing.marker((3, 0, -90.0), size, style.INK, style.INK)
+    start = scene_drawing.marker_handle("robot at its start", **look)
     found: dict[object, Patch | Line2D] = {start.get_label(): start}
     for scene in scenes:
         for handle in scene_drawing.map_legend(scene):
