@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -46,45 +46,42 @@ def draw_energy(
     """
     require_same_mission(scene, plan, log)
     planned = planned_curves(scene, plan)
-    driven = measured_curves(scene, plan, log) if log else (None,) * len(planned)
+    driven = measured_curves(scene, plan, log) if log else ()
     width_in, panel_in = _PANEL_INCHES
     figure = new_figure(width_in, panel_in * len(planned) + 0.7)
     panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, predicted, simulated in zip(panels, planned, driven, strict=True):
-        draw_battery(axes, scene, predicted, simulated)
+    for at, axes in enumerate(panels):
+        draw_battery(axes, scene, (planned[at], *driven[at : at + 1]))
     panels[-1].set_xlabel("time [s]")
     add_legend_above(figure, panels[0].get_legend_handles_labels()[0])
     write_figure(figure, path)
 
 
-def draw_battery(
-    axes: Axes,
-    scene: Scene,
-    planned: BatteryCurve,
-    simulated: BatteryCurve | None,
-) -> None:
-    """Draw one robot's battery content, its reserve, recharges and goals."""
-    robot = scene.robot(planned.robot)
+def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> None:
+    """Draw one robot's battery content, its reserve, recharges and goals.
+
+    Args:
+        axes: where to draw, over time [s].
+        scene: gives capacity and reserve.
+        curves: of the robot: as planned, and as simulated where it was.
+    """
+    robot = scene.robot(curves[0].robot)
     color = style.scene_robot_colors(scene)[robot.id]
     capacity_kJ = robot.battery.capacity_J / 1000.0
     reserve_kJ = robot.battery.reserve_J / 1000.0
-    curves = {
-        "planned": (planned, style.PLANNED),
-        "simulated": (simulated, style.DRIVEN),
-    }
-    for label, (curve, look) in curves.items():
-        if curve is not None:
-            stroke = look.stroke(scene_drawing.LETTER_POINTS)
-            _plot(axes, curve, color=color, label=label, **stroke)
+    looks = {"planned": style.PLANNED, "simulated": style.DRIVEN}
+    for curve, (label, look) in zip(curves, looks.items(), strict=False):
+        stroke = look.stroke(scene_drawing.LETTER_POINTS) | {"solid_joinstyle": "round"}
+        time_s, energy_J = with_recharge_jumps(curve)
+        axes.plot(time_s, energy_J / 1000.0, color=color, label=label, **stroke)
     axes.axhline(
         reserve_kJ, color=style.RESERVE, linewidth=1.2, linestyle="--", label="reserve"
     )
     axes.axhspan(0.0, reserve_kJ, color=style.RESERVE, alpha=0.08, linewidth=0)
-    shown = [curve for curve in (planned, simulated) if curve is not None]
-    axes.set_xlim(0.0, max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in shown)))
-    room = _mark_visits(axes, scene, (simulated or planned).visits)
-    least = min(float(with_recharge_jumps(curve)[1].min()) for curve in shown)
-    low = min(0.0, 1.05 * least / robot.battery.capacity_J)
+    axes.set_xlim(0.0, max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in curves)))
+    room = _mark_visits(axes, scene, curves[-1].visits)
+    least_J = min(curve.least_J for curve in curves)
+    low = min(0.0, 1.05 * least_J / robot.battery.capacity_J)
     high = low + (_FULL_SHARE - low) / (1.0 - room)
     axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
     axes.set_ylabel("battery [kJ]")
@@ -95,11 +92,6 @@ def draw_battery(
     percent.set_yticks([0, 25, 50, 75, 100])
     percent.set_ylabel("charge [%]")
     percent.spines["top"].set_visible(False)
-
-
-def _plot(axes: Axes, curve: BatteryCurve, **look: Any) -> None:
-    time_s, energy_J = with_recharge_jumps(curve)
-    axes.plot(time_s, energy_J / 1000.0, solid_joinstyle="round", **look)
 
 
 def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> float:

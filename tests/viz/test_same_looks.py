@@ -71,12 +71,10 @@ def test_paths_and_curves_have_one_look_everywhere(mission) -> None:
     ]
     color = style.scene_robot_colors(scene)["r1"]
     (panel,) = (Figure().add_subplot(),)
-    energy_plot.draw_battery(
-        panel,
-        scene,
-        energy_plot.planned_curves(scene, plan)[0],
-        energy_plot.measured_curves(scene, plan, log)[0],
+    planned, driven = (
+        battery_curves.shown_curves(scene, plan, of) for of in (None, log)
     )
+    energy_plot.draw_battery(panel, scene, (planned[0], driven[0]))
     for lines in (axes.lines, panel.lines):
         looks = [
             (line.get_linewidth(), line.get_alpha())
