@@ -16,13 +16,10 @@ from mrmg.energy.battery_curves import (
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
-from mrmg.viz import scene_drawing, style
-from mrmg.viz.figures import add_legend_above, new_figure, tidy, write_figure
-from mrmg.viz.timeline_rows import HIDDEN, named_visits
+from mrmg.viz import figures, scene_drawing, style
+from mrmg.viz.timeline_rows import named_visits
 
 _PANEL_INCHES = (9.5, 2.5)
-_NAME_POINTS, _NAMES_EM = 8.5, 7.8 * 72.0 / 8.5
-"""Size of the visits' names, and width of the time axis, at least, in such letters."""
 _LINE_SHARE = 0.082
 """Height of a line of names, in heights of the panel."""
 _FULL_SHARE = 1.04
@@ -48,13 +45,13 @@ def draw_energy(
     planned = planned_curves(scene, plan)
     driven = measured_curves(scene, plan, log) if log else ()
     width_in, panel_in = _PANEL_INCHES
-    figure = new_figure(width_in, panel_in * len(planned) + 0.7)
+    figure = figures.new_figure(width_in, panel_in * len(planned) + 0.7)
     panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
     for at, axes in enumerate(panels):
         draw_battery(axes, scene, (planned[at], *driven[at : at + 1]))
     panels[-1].set_xlabel("time [s]")
-    add_legend_above(figure, panels[0].get_legend_handles_labels()[0])
-    write_figure(figure, path)
+    figures.add_legend_above(figure, panels[0].get_legend_handles_labels()[0])
+    figures.write_figure(figure, path)
 
 
 def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> None:
@@ -86,7 +83,7 @@ def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> No
     axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
     axes.set_ylabel("battery [kJ]")
     axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
-    tidy(axes)
+    figures.tidy(axes)
     percent = axes.twinx()
     percent.set_ylim(100.0 * low, 100.0 * high)
     percent.set_yticks([0, 25, 50, 75, 100])
@@ -96,12 +93,11 @@ def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> No
 
 def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> float:
     """Mark and name visits; return the share of the height that the names take."""
-    end_s = float(axes.get_xlim()[1])
-    named = named_visits(scene, visits, end_s, (_NAMES_EM,))
+    named = named_visits(scene, visits, float(axes.get_xlim()[1]), (figures.NAMES_EM,))
     rows = max([1, *(item.lines[0] + 1 for item in named)])
     for item in named:
-        station, line = item.visit.kind == "station", item.lines[0]
-        bottom = 1.0 - _LINE_SHARE * (rows - max(line, 0))
+        station = item.visit.kind == "station"
+        bottom = 1.0 - _LINE_SHARE * (rows - max(item.lines[0], 0))
         axes.axvline(
             item.visit.time_s,
             ymax=bottom,
@@ -110,18 +106,12 @@ def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> float:
             linestyle="-" if station else ":",
             zorder=0.5,
         )
-        if line != HIDDEN:
-            half_s = 0.5 * item.width_em / _NAMES_EM * end_s
-            axes.text(
-                min(max(item.visit.time_s, half_s), end_s - half_s),
-                bottom,
-                item.text,
-                transform=axes.get_xaxis_transform(),
-                fontsize=_NAME_POINTS,
-                fontweight="bold" if station else "normal",
-                color=style.STATION_EDGE if station else style.MUTED,
-                ha="center",
-                va="bottom",
-                bbox={"fc": "white", "ec": "none", "pad": 0.3},
-            )
+        figures.write_name(
+            axes,
+            item,
+            bottom,
+            transform=axes.get_xaxis_transform(),
+            fontweight="bold" if station else "normal",
+            color=style.STATION_EDGE if station else style.MUTED,
+        )
     return rows * _LINE_SHARE

@@ -14,10 +14,16 @@ from matplotlib.figure import Figure
 
 from mrmg import storage
 from mrmg.errors import UsageError
+from mrmg.viz.timeline_rows import HIDDEN, NamedVisit
 
 DPI = 110
 FORMATS = (".pdf", ".svg", ".png")
 """What figures can be written as."""
+
+NAME_POINTS = 8.5
+"""Size of the names of visits."""
+NAMES_EM = 7.8 * 72.0 / NAME_POINTS
+"""Width of axes of time, at least, in letters of such names."""
 
 FOR_PRINT: Any = {
     # Journals want text as text, in embedded TrueType fonts.
@@ -69,6 +75,31 @@ def add_legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
         frameon=False,
         fontsize=9.5,
     )
+
+
+def write_name(axes: Axes, named: NamedVisit, bottom: float, **look: Any) -> None:
+    """Write the name of a visit where its time is, if it has room in its first layout.
+
+    Args:
+        axes: over the time of the mission [s]; not less than `NAMES_EM` wide.
+        named: what to write.
+        bottom: lower end of the name, up the axes.
+        **look: as of matplotlib's `Text`.
+    """
+    if named.lines[0] != HIDDEN:
+        end_s = axes.get_xlim()[1]
+        half_s = 0.5 * named.width_em / NAMES_EM * end_s
+        axes.text(
+            min(max(named.visit.time_s, half_s), end_s - half_s),
+            bottom,
+            named.text,
+            fontsize=NAME_POINTS,
+            ha="center",
+            va="bottom",
+            bbox={"fc": "white", "ec": "none", "pad": 0.3},
+            zorder=4,
+            **look,
+        )
 
 
 def write_figure(figure: Figure, path: Path) -> None:

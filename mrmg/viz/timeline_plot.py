@@ -13,15 +13,11 @@ from matplotlib.patches import Patch
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
-from mrmg.viz import style
+from mrmg.viz import figures, style
 from mrmg.viz.activities import BROKEN, CHARGING, DRIVING, WAITING
-from mrmg.viz.figures import add_legend_above, new_figure, write_figure
-from mrmg.viz.timeline_rows import HIDDEN, TimelineRow, timeline_rows
+from mrmg.viz.timeline_rows import TimelineRow, timeline_rows
 
 _WIDTH_INCHES, _BAR_INCHES, _LINE_INCHES = 9.5, 0.24, 0.16
-_NAME_POINTS = 8.5
-_NAMES_EM = 8.0 * 72.0 / _NAME_POINTS
-"""Width of the time axis, at least, in letters of the names."""
 _LOOKS: dict[str, dict[str, Any]] = {
     WAITING: {"facecolor": "white", "edgecolor": style.MUTED, "hatch": "////"},
     CHARGING: {"facecolor": style.STATION, "edgecolor": style.STATION_EDGE},
@@ -46,10 +42,10 @@ def draw_timeline(
         IdentityError: if scene, plan and log do not belong together.
     """
     require_same_mission(scene, plan, log)
-    rows, end_s = timeline_rows(scene, plan, log, (_NAMES_EM,))
+    rows, end_s = timeline_rows(scene, plan, log, (figures.NAMES_EM,))
     lines = np.array([row.line_count(0) for row in rows])
     tops_in = np.cumsum(2.0 * _BAR_INCHES + _LINE_INCHES * lines)
-    figure = new_figure(_WIDTH_INCHES, 1.0 + tops_in[-1])
+    figure = figures.new_figure(_WIDTH_INCHES, 1.0 + tops_in[-1])
     axes = figure.add_subplot()
     axes.set_xlim(0.0, end_s)
     for bottom_in, row in zip(tops_in, rows, strict=True):
@@ -70,8 +66,8 @@ def draw_timeline(
         handles.append(Patch(**_LOOKS[BROKEN], label="broken down"))
     if log and log.events:
         handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
-    add_legend_above(figure, handles)
-    write_figure(figure, path)
+    figures.add_legend_above(figure, handles)
+    figures.write_figure(figure, path)
 
 
 def _draw_row(
@@ -88,27 +84,13 @@ def _draw_row(
                 **looks[span.kind],
             )
     if row.standing == "not used":
-        spot = 0.01 * end_s, middle_in
-        axes.text(
-            *spot, row.standing, fontsize=_NAME_POINTS, color=style.MUTED, va="center"
-        )
+        look: Any = {"fontsize": figures.NAME_POINTS, "color": style.MUTED}
+        axes.text(0.01 * end_s, middle_in, row.standing, va="center", **look)
     for named in row.visits:
-        line, time_s = named.lines[0], named.visit.time_s
+        lines, time_s = max(named.lines[0], 0), named.visit.time_s
         station = named.visit.kind == "station"
         color = style.STATION_EDGE if station else style.INK
-        top_in = middle_in - 0.65 * _BAR_INCHES - _LINE_INCHES * max(line, 0)
+        top_in = middle_in - 0.65 * _BAR_INCHES - _LINE_INCHES * lines
         bottom_in = middle_in + 0.5 * _BAR_INCHES
         axes.plot([time_s] * 2, [top_in, bottom_in], color=color, linewidth=0.9)
-        if line != HIDDEN:
-            half_s = 0.5 * named.width_em / _NAMES_EM * end_s
-            axes.text(
-                min(max(time_s, half_s), end_s - half_s),
-                top_in,
-                named.text,
-                fontsize=_NAME_POINTS,
-                ha="center",
-                va="bottom",
-                color=color,
-                bbox={"fc": "white", "ec": "none", "pad": 0.4},
-                zorder=4,
-            )
+        figures.write_name(axes, named, top_in, color=color)
