@@ -8,6 +8,16 @@ from typing import Any
 
 import numpy as np
 
+_MOST_SAMPLES = 1200
+_FINEST_S = 0.1
+
+
+def grid(end_s: float) -> np.ndarray:
+    """Return the times of a page's charts from 0 to an end [s], at least two."""
+    end_s = max(end_s, _FINEST_S)
+    samples = min(math.ceil(end_s / _FINEST_S) + 1, _MOST_SAMPLES)
+    return np.linspace(0.0, end_s, samples)
+
 
 def chart(
     name: str,

@@ -20,23 +20,20 @@ from mrmg.energy.battery_curves import (
 from mrmg.energy.metering import Motion
 from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
-from mrmg.report.chart_spec import chart, line, rounded
+from mrmg.report.chart_spec import chart, grid, line, rounded
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.verification.distances import obstacle_distance, robot_distance
-
-_MOST_SAMPLES = 1200
-_FINEST_S = 0.1
 
 
 def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, Any]:
     """Return everything the report's script needs.
 
     Returns:
-        `time_s`; `robots` with their poses on the map; `visits`; and `charts` as of
-        `chart_spec`.
+        `time_s`; `robots` with their poses on the map; `visited_s`, when each goal was
+        visited; and `charts` as of `chart_spec`.
     """
-    time_s = _grid(plan, log)
+    time_s = grid(max(plan.makespan_s, log.time_s[-1] if log else 0.0))
     curves = shown_curves(scene, plan, log)
     poses = [_poses(curve, time_s) for curve in curves]
     return {
@@ -47,20 +44,15 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
                 "x": rounded(pose[:, 0] - scene.bounds[0], 2),
                 "y": rounded(scene.bounds[3] - pose[:, 1], 2),
                 "turn": rounded(-np.degrees(pose[:, 2]), 1),
-                "speed": rounded(pose[:, 3], 2),
             }
             for curve, pose in zip(curves, poses, strict=True)
         ],
-        "visits": [
-            {
-                "target": visit.target,
-                "robot": visit.robot,
-                "kind": visit.kind,
-                "time_s": round(visit.time_s, 2),
-            }
+        "visited_s": {
+            visit.target: round(visit.time_s, 2)
             for curve in curves
             for visit in curve.visits
-        ],
+            if visit.kind == "goal"
+        },
         "charts": [
             *_charge_charts(scene, plan, curves if log else (), time_s),
             *_course_charts(scene, log, poses, time_s),
@@ -68,18 +60,10 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
     }
 
 
-def _grid(plan: Plan, log: ExecutionLog | None) -> np.ndarray:
-    end_s = max(plan.makespan_s, _FINEST_S)
-    if log is not None:
-        end_s = max(end_s, float(log.time_s[-1]))
-    samples = min(int(np.ceil(end_s / _FINEST_S)) + 1, _MOST_SAMPLES)
-    return np.linspace(0.0, end_s, max(samples, 2))
-
-
 def _poses(motion: Motion, time_s: np.ndarray) -> np.ndarray:
-    """Return (x, y, theta, v) at the grid's times; the ends are held."""
+    """Return (x, y, theta) at the grid's times; the ends are held."""
     return np.stack(
-        [np.interp(time_s, motion.time_s, motion.state[:, at]) for at in range(4)],
+        [np.interp(time_s, motion.time_s, motion.state[:, at]) for at in range(3)],
         axis=1,
     )
 

@@ -15,8 +15,6 @@ from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
 from mrmg.report.page import page, rendered
 
-_SAMPLES = 800
-_SHORTEST_S = 0.1
 _CHARTS = (
     ("used", "Energy drawn by the fleet", "kJ", 1),
     ("goals", "Goals visited", "", 0),
@@ -70,7 +68,7 @@ def _charts(
 ) -> dict[str, Any]:
     """Return the charts of all runs that have curves, by their number."""
     ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
-    time_s = np.linspace(0.0, max(_SHORTEST_S, *ends_s), _SAMPLES)
+    time_s = chart_spec.grid(max(ends_s))
     courses = {number: _courses(run, time_s) for number, run in curves.items()}
     charts = []
     for name, title, unit, digits in _CHARTS:

@@ -40,7 +40,7 @@ def test_every_series_has_a_value_or_null_at_every_time(mission) -> None:
     for item in data["charts"]:
         assert {len(series["values"]) for series in item["series"]} == {times}
     for robot in data["robots"]:
-        for name in ("x", "y", "turn", "speed"):
+        for name in ("x", "y", "turn"):
             assert len(robot[name]) == times
 
 
@@ -106,7 +106,8 @@ def test_a_plan_alone_has_charts_of_the_plan(mission) -> None:
     assert "tracking" not in {item["id"] for item in data["charts"]}
     lines = chart(data, "charge-r1")["series"]
     assert [line["label"] for line in lines] == ["planned", "reserve"]
-    assert [visit["target"] for visit in data["visits"]] == ["s", "g"]
+    visit_s = {visit.target: visit.time_s for visit in plan.visits}
+    assert data["visited_s"] == {"g": pytest.approx(visit_s["g"], abs=0.01)}
 
 
 def test_robots_turn_clockwise_on_a_map_whose_y_points_down(

@@ -167,7 +167,6 @@
     if (!slider) return;
     shownIndex = index;
     const time = data.time_s[index];
-    const end = data.time_s[data.time_s.length - 1];
     data.robots.forEach((robot) => {
       const group = one(`.map .robot[data-robot="${CSS.escape(robot.id)}"]`);
       const x = robot.x[index], y = robot.y[index];
@@ -178,13 +177,12 @@
       name.setAttribute("y", y + down);
       keepInside(name);
     });
-    const done = new Map(data.visits
-      .filter((visit) => visit.kind === "goal" && visit.time_s <= time + 1e-6)
-      .map((visit) => [visit.target, visit.robot]));
+    const done = new Set(Object.keys(data.visited_s)
+      .filter((goal) => data.visited_s[goal] <= time + 1e-6));
     all(".map .goal").forEach((goal) => goal.classList.toggle("done", done.has(goal.dataset.target)));
     const mark = one(".timeline .now");
     mark.hidden = false;
-    mark.style.left = `${(100 * time) / Number(one(".timeline").dataset.end || end)}%`;
+    mark.style.left = `${(100 * time) / Number(one(".timeline").dataset.end)}%`;
     slider.value = index;
     one("#clock").textContent = `${time.toFixed(1)} s, ${done.size} of ${all(".map .goal").length} goals`;
   }
