@@ -54,8 +54,7 @@ def comparison_html(comparison: Comparison) -> str:
     )
     # Courses have a colour for each run; maps have one for each robot.
     colored = max(len(names), *(len(item.scene.robots) for item in records))
-    owners = [str(number) for number in range(colored)]
-    return page("Comparison of runs", body, robots=owners, data=data)
+    return page("Comparison of runs", body, colors=colored, data=data)
 
 
 def _owner(number: int) -> str:

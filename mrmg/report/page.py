@@ -9,7 +9,7 @@ elements are the macros of `elements.html.jinja`; templates escape what is not m
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -41,7 +41,7 @@ def page(
     title: str,
     body: Markup,
     *,
-    robots: Sequence[str] = (),
+    colors: int = 0,
     data: Mapping[str, Any] | None = None,
     instead: str = "",
 ) -> str:
@@ -50,19 +50,21 @@ def page(
     Args:
         title: of the window.
         body: what it shows.
-        robots: whose colours styles and script know as `--r0`, `--r1`, ...
+        colors: how many colours styles and script know as `--r0`, `--r1`, ...: those
+            of robots in the scene's order.
         data: what the page's script draws charts of; None for a page without charts.
         instead: what is told to those whose browsers draw no charts.
     """
     text = (
         "" if data is None else json.dumps(data, separators=(",", ":"), allow_nan=False)
     )
+    owners = [str(number) for number in range(colors)]
     frame = rendered(
         "page.html.jinja",
         title=title,
         body=body,
-        light=style.robot_colors(robots).values(),
-        dark=style.robot_colors_on_dark(robots).values(),
+        light=style.robot_colors(owners).values(),
+        dark=style.robot_colors_on_dark(owners).values(),
         looks={"planned": style.PLANNED, "driven": style.DRIVEN},
         # A closing tag inside a string would end the element that holds the data.
         data=Markup(text.replace("</", "<\\/")),

@@ -123,13 +123,9 @@ def _said(place: str, value: float | str, times: Mapping[str, float]) -> str:
     return text
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float | str]]:
-    """Return nested figures as (place, value), times first; lists are left out."""
-    entries: list[tuple[str, float | str]] = []
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            entries += _flat(value, f"{prefix}{name}.")
-        elif isinstance(value, (str, int, float)):
-            entries.append((f"{prefix}{name}", value))
-    ranks = {place: rank for rank, place in enumerate(_NAMES)}
-    return sorted(entries, key=lambda entry: ranks.get(entry[0], len(ranks)))
+def _flat(statistics: Mapping[str, Any]) -> list[tuple[str, float | str]]:
+    """Return figures as (place, value), times first; what is no figure is left out."""
+    spent_s = statistics.get("time_s", {})
+    times = {f"time_s.{name}": value for name, value in spent_s.items()}
+    known = {**dict.fromkeys(_NAMES), **times, **statistics}
+    return [item for item in known.items() if isinstance(item[1], str | int | float)]

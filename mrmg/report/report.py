@@ -81,10 +81,9 @@ def report_html(record: RunRecord) -> str:
             for study in studies
         ],
     )
-    ids = [robot.id for robot in scene.robots]
     instead = "energy.png and overview.png in the run folder show the same"
     title = f"{scene.name}: mission report"
-    return page(title, body, robots=ids, data=data, instead=instead)
+    return page(title, body, colors=len(scene.robots), data=data, instead=instead)
 
 
 def _of_plan(record: RunRecord, plan: Plan) -> dict[str, Any]:

@@ -83,7 +83,7 @@ def test_paths_and_curves_have_one_look_everywhere(mission) -> None:
         ]
         assert looks == expected
         assert {line.get_linestyle() for line in lines[:2]} == {"-"}
-    page = report_page.page("t", Markup(), robots=["r1"])
+    page = report_page.page("t", Markup(), colors=1)
     for name, look in (("planned", style.PLANNED), ("driven", style.DRIVEN)):
         assert f"--{name}-width:{look.width_em:g};" in page
         assert f"--{name}-opacity:{look.opacity:g};" in page
