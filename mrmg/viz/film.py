@@ -145,17 +145,14 @@ class Stage:
         self._tags = [
             Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
         ]
-        named = _labels(film)
-        self._target_labels = [
-            (label, spot) for kind, label, spot in named if kind != "obstacle"
-        ]
+        self._named = _labels(film)
         self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
         self._painted = 0
         self._trailed = 0
         radius_m = max(r.model.circumscribed_radius_m for r in film.scene.robots)
         self._top = TopView(view, film.map_frame, radius_m)
         self._map_labels = [
-            (label, film.map_frame.to_pixels(spot)) for _, label, spot in named
+            (label, film.map_frame.to_pixels(spot)) for _, label, spot in self._named
         ]
         self._marked: set[str] = set()
         for target in film.scene.targets():
@@ -214,8 +211,8 @@ class Stage:
         size = (pane.shape[1], pane.shape[0])
         pane[:] = self._view.draw(camera, size, fovy=CHASE_FOVY_DEG, shadows=True)
         near_m = np.array([x_m, y_m])
-        for label, spot in self._target_labels:
-            if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
+        for kind, label, spot in self._named:
+            if kind != "obstacle" and np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
                 at = self._view.project(lifted(film.scene, spot, 0.0))[0]
                 label.blit(pane, at)
         tops = [

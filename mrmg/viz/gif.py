@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageOps
 
 from mrmg import storage
 from mrmg.errors import UsageError
@@ -87,21 +87,14 @@ def write_gif(
         UsageError: if it would be too large at any scale.
     """
     for share in _SHARES:
-        _encode(_scaled(frames, share), path)
+        small = [ImageOps.scale(one, share, Image.Resampling.LANCZOS) for one in frames]
+        _encode(small, path)
         if path.stat().st_size < largest_bytes:
             return
     raise UsageError(
         f"the GIF would be larger than {largest_bytes / 1e6:g} MB; choose a higher "
         "--speed, or a shorter part with --from and --to"
     )
-
-
-def _scaled(frames: Sequence[Image.Image], share: float) -> list[Image.Image]:
-    size = (round(share * frames[0].width), round(share * frames[0].height))
-    return [
-        frame if share == 1.0 else frame.resize(size, Image.Resampling.LANCZOS)
-        for frame in frames
-    ]
 
 
 def _encode(frames: Sequence[Image.Image], path: Path) -> None:

@@ -57,10 +57,7 @@ def enclosing_circle(
     robot: Robot, pose: tuple[float, float, float]
 ) -> tuple[np.ndarray, float]:
     """Return centre [m], shape (2,), and radius [m] of a circle about a robot."""
-    outline = robot.model.footprint_m
-    middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
-    radius_m = float(np.hypot(*(outline - middle).T).max())
-    return placed(middle[None], pose)[0], radius_m
+    return placed(robot.model.middle_m[None], pose)[0], robot.model.radius_m
 
 
 def end_ring(

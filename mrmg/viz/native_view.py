@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
+from functools import partial
 
 import numpy as np
 from matplotlib.colors import to_rgb, to_rgba
@@ -58,7 +59,7 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
     window = launch_passive(
         model,
         data,
-        key_callback=lambda key: steer(replay, key),
+        key_callback=partial(steer, replay) if replay else None,
         show_left_ui=False,
         show_right_ui=replay is not None,
     )
@@ -127,15 +128,13 @@ def follow_slider(replay: Replay, control: float) -> None:
         replay.seek(control)
 
 
-def steer(replay: Replay | None, key: int) -> None:
+def steer(replay: Replay, key: int) -> None:
     """Do what a key stands for; see `KEYS`.
 
     Args:
         replay: to be steered.
         key: code of the key as GLFW has it.
     """
-    if replay is None:
-        return
     if key == _SPACE:
         replay.toggle()
     elif key in (_LEFT, _RIGHT):

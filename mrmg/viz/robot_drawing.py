@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import why_not_driven
 from mrmg.scene.robot_figures import figure_lines
 from mrmg.scene.robot_model import RobotModel
@@ -83,9 +82,8 @@ def _draw_rendered(
     seen_m = 1.25 * max(extent[1], extent[0] * height / width)
     points = np.column_stack([outline, np.full(len(outline), 0.01)])
     with open_view(world, ground, _PIXELS) as view:
-        data = mujoco.MjData(world.model)
         for axes, camera, fovy in ((seen, corner, _FOVY_DEG), (above, top, seen_m)):
-            view.place(data.qpos)
+            view.place(world.model.qpos0)
             axes.imshow(view.draw(camera, _PIXELS, fovy=fovy, shadows=True))
             axes.plot(*view.project(points).T, color=_OUTLINE, path_effects=HALO)
             if camera is top:

@@ -43,10 +43,9 @@ def body_meshes(
 def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     """Return the shape of a geom in its body's frame."""
     mesh = _shape(model, geom)
-    pose = np.eye(4)
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    pose[:3, :3], pose[:3, 3] = turn.reshape(3, 3), model.geom_pos[geom]
+    turned: Any = trimesh.transformations.quaternion_matrix
+    pose = turned(model.geom_quat[geom])
+    pose[:3, 3] = model.geom_pos[geom]
     mesh.apply_transform(pose)
     return mesh
 

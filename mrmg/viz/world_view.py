@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from typing import Any
 
 import numpy as np
 
@@ -81,7 +80,6 @@ class WorldView:
         )
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._floor = model.texture(FLOOR)
-        self._camera: Any = None
         self._size = (0, 0)
 
     @property
@@ -149,9 +147,6 @@ class WorldView:
         mujoco.mjr_render(view, self._scene, self._context)
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(pixels, None, view, self._context)
-        self._camera = mujoco.mjv_averageCamera(
-            self._scene.camera[0], self._scene.camera[1]
-        )
         return pixels[::-1]
 
     def project(self, points: np.ndarray) -> np.ndarray:
@@ -159,7 +154,8 @@ class WorldView:
 
         Points behind the camera are NaN.
         """
-        camera, (width, height) = self._camera, self._size
+        width, height = self._size
+        camera = mujoco.mjv_averageCamera(*self._scene.camera)
         forward, up = np.asarray(camera.forward), np.asarray(camera.up)
         offset = points - np.asarray(camera.pos)
         depth = offset @ forward
