@@ -69,6 +69,8 @@ class BrowserView:
         self._frames = self._add_bodies()
         self.tags = self._add_tags()
         self._place(self._world.model.qpos0)
+        for body in np.flatnonzero(self._world.model.body_weldid == 0):
+            self._frames.pop(int(body), None)  # it does not move: sending it takes time
         self._look_from_above()
         if replay is not None:
             self._add_driven(replay)
@@ -163,20 +165,13 @@ class BrowserView:
         return handles
 
     def _add_bodies(self) -> dict[int, Any]:
-        """Add every body's shapes; return the frames of those that move."""
-        model = self._world.model
-        mujoco.mj_kinematics(model, self._data)
+        """Add every body's shapes; return the bodies' frames, which are not placed."""
         frames: dict[int, Any] = {}
         marks = frozenset(self._world.target_geom.values())
-        for body, color, mesh in body_meshes(model, without=marks):
+        for body, color, mesh in body_meshes(self._world.model, without=marks):
             name = f"/world/{body}"
             if body not in frames:
-                frames[body] = self._server.scene.add_frame(
-                    name,
-                    show_axes=False,
-                    position=self._data.xpos[body],
-                    wxyz=self._data.xquat[body],
-                )
+                frames[body] = self._server.scene.add_frame(name, show_axes=False)
             self._server.scene.add_mesh_simple(
                 f"{name}/{'-'.join(map(str, color))}",
                 np.asarray(mesh.vertices),
@@ -184,11 +179,7 @@ class BrowserView:
                 color=color,
                 flat_shading=True,
             )
-        return {
-            body: frame
-            for body, frame in frames.items()
-            if model.body_weldid[body] != 0
-        }
+        return frames
 
     def _add_tags(self) -> dict[str, Any]:
         tags = {}
