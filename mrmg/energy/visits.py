@@ -61,8 +61,7 @@ def visit_of(
     robot: str, target: Goal | Station, time_s: np.ndarray, step: int
 ) -> Visit:
     """Return a robot's visit from a step on, with its battery's content left at 0."""
-    kind = "station" if isinstance(target, Station) else "goal"
-    return Visit(robot, target.id, kind, step, float(time_s[step]), 0.0)
+    return Visit(robot, target.id, target.kind, step, float(time_s[step]), 0.0)
 
 
 def first_stay(

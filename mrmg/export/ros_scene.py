@@ -66,7 +66,7 @@ def scene_markers(ros: RosTypes, scene: Scene) -> Any:
         markers.append(_ground(ros, scene))
     markers += [_solid(ros, scene, obstacle) for obstacle in scene.obstacles]
     for station in scene.stations:
-        markers += _target(ros, scene, "station", station, palette.STATION)
+        markers += _target(ros, scene, station, palette.STATION)
     return _array(ros, markers)
 
 
@@ -82,7 +82,7 @@ def goal_markers(
     markers: list[Any] = []
     for goal in scene.goals:
         if goal.id in goals:
-            markers += _target(ros, scene, "goal", goal, color)
+            markers += _target(ros, scene, goal, color)
     return _array(ros, markers, time_s)
 
 
@@ -118,14 +118,10 @@ def _array(ros: RosTypes, markers: list[Any], time_s: float = 0.0) -> Any:
 
 
 def _target(
-    ros: RosTypes,
-    scene: Scene,
-    kind: str,
-    target: Goal | Station,
-    color: palette.Rgb,
+    ros: RosTypes, scene: Scene, target: Goal | Station, color: palette.Rgb
 ) -> Iterator[Any]:
     """Yield the region of a goal or station, and its name."""
-    name = f"{kind} {target.id}"
+    name = f"{target.kind} {target.id}"
     yield _flat(ros, scene, name, target.region.shape, color)
     above = lifted(scene, target.region.center, _LETTER_M)[0]
     yield _text(ros, f"{name} name", above, target.id)

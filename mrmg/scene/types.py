@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from shapely.geometry import Polygon
 
@@ -72,6 +72,7 @@ class Goal:
     """A region that some robot's reference point must enter once.
 
     Attributes:
+        kind: "goal".
         id: unique name.
         region: where it is.
         dwell_s: how long the robot must stay there without a break.
@@ -79,6 +80,7 @@ class Goal:
         heading_tolerance_rad: allowed deviation from the heading.
     """
 
+    kind: ClassVar[str] = "goal"
     id: str
     region: Region
     dwell_s: float = 0.0
@@ -91,12 +93,14 @@ class Station:
     """A region in which a robot's battery is filled.
 
     Attributes:
+        kind: "station".
         id: unique name.
         region: where it is.
         dwell_s: how long a robot must stay there without a break for a visit.
         one_at_a_time: whether the reference points of two robots must never be there.
     """
 
+    kind: ClassVar[str] = "station"
     id: str
     region: Region
     dwell_s: float = 0.0

@@ -92,9 +92,8 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
         is_hull=_is_hull(scene, model),
         geom_label=tuple(_label(model, geom) for geom in range(model.ngeom)),
         target_geom={
-            target.id: model.geom(f"{kind}:{target.id}").id
-            for kind, targets in (("goal", scene.goals), ("station", scene.stations))
-            for target in targets
+            target.id: model.geom(f"{target.kind}:{target.id}").id
+            for target in scene.targets()
             if drawn
         },
         chassis=np.array(

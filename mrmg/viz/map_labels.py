@@ -17,7 +17,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.plans import Plan
-from mrmg.scene.types import Scene, Station
+from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
@@ -139,9 +139,9 @@ def _targets(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
     names = style.target_labels(scene)
     for target in scene.targets():
         shape, text = drawn_region(target.region, em_m), names[target.id]
-        kind = "station" if isinstance(target, Station) else "goal"
-        yield _beside(kind, target.id, text, shape, em_m, _UPPER_RIGHT)
-        for robot, rank in ranks.get(target.id, ()) if kind == "station" else ():
+        yield _beside(target.kind, target.id, text, shape, em_m, _UPPER_RIGHT)
+        stops = ranks.get(target.id, ()) if target.kind == "station" else ()
+        for robot, rank in stops:
             yield _beside("stop", robot, str(rank), shape, em_m, _LOWER_RIGHT)
 
 

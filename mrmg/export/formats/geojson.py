@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from mrmg import storage
 from mrmg.export.mission import Course, Mission, path_indices
 from mrmg.export.table import Files, Format
-from mrmg.scene.types import Goal, Scene
+from mrmg.scene.types import Scene
 
 _OF_A_VISIT = ("robot", "time_s", "energy_J")
 _LOCAL_METRES = {"type": "name", "properties": {"name": "local"}}
@@ -63,7 +63,7 @@ def _places(mission: Mission) -> Iterator[dict[str, Any]]:
             visits.setdefault(visit.target, []).append(made)
     for target in mission.scene.targets():
         keys = {
-            "kind": "goal" if isinstance(target, Goal) else "station",
+            "kind": target.kind,
             "id": target.id,
             "dwell": target.dwell_s,
             "visits": visits.get(target.id, []),

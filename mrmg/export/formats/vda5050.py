@@ -24,7 +24,7 @@ from mrmg.export.mission import Course, Mission, bends, every
 from mrmg.export.route import STANDING_M_S, Node, Route, route_of
 from mrmg.export.table import Files, Format
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.types import Goal, Scene, Station
+from mrmg.scene.types import Goal, Scene
 from mrmg.viz.activities import lengths_along
 
 MANUFACTURER = "mrmg"
@@ -144,7 +144,7 @@ def _node(scene: Scene, route: Route, number: int, node: Node) -> _Json:
     return {
         "nodeId": node.id,
         "sequenceId": 2 * number,
-        "nodeDescription": ", ".join(map(_described, node.targets)),
+        "nodeDescription": ", ".join(f"{one.kind} {one.id}" for one in node.targets),
         "released": True,
         "nodePosition": {
             "x": _rounded(x_m),
@@ -194,7 +194,7 @@ def _actions(node: Node) -> list[_Json]:
     for target in node.targets:
         is_goal = isinstance(target, Goal)
         parameters = [
-            {"key": "goalId" if is_goal else "stationId", "value": target.id},
+            {"key": f"{target.kind}Id", "value": target.id},
             {"key": "dwell", "value": target.dwell_s},
         ]
         passing = is_goal and target.dwell_s == 0.0
@@ -203,7 +203,7 @@ def _actions(node: Node) -> list[_Json]:
                 {
                     "actionId": f"{node.id}-{kind}-{target.id}",
                     "actionType": kind,
-                    "actionDescription": f"{kind} at {_described(target)}",
+                    "actionDescription": f"{kind} at {target.kind} {target.id}",
                     "blockingType": "NONE" if passing else "HARD",
                     "actionParameters": parameters,
                 }
@@ -296,10 +296,6 @@ def _condition(mission: Mission, course: Course, tick: int) -> _Json:
         "errors": [error] if broken else [],
         "safetyState": {"eStop": "NONE", "fieldViolation": False},
     }
-
-
-def _described(target: Goal | Station) -> str:
-    return f"{'goal' if isinstance(target, Goal) else 'station'} {target.id}"
 
 
 def _angle(angle_rad: float) -> float:
