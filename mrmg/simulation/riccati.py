@@ -41,7 +41,7 @@ def unbounded_solver(
     """
     guess, target = ca.MX.sym("guess", SIZE), ca.MX.sym("target", SIZE)
     linearise = _stage_deviation(motion_model, wheelbase_m)
-    backward, forward = _backward(linearise.sparsity_out(0)), _forward()
+    backward = _backward(linearise.sparsity_out(0))
     stages = []
     for k in range(HORIZON):
         now = slice(k * STAGE, (k + 1) * STAGE)
@@ -58,7 +58,8 @@ def unbounded_solver(
     deviation = guess[:NX] - target[:NX]
     solution = [deviation]
     for (slope, gap), (gain, offset) in zip(stages, reversed(gains), strict=True):
-        control, deviation = forward(deviation, slope, gap, gain, offset)
+        control = gain @ deviation + offset
+        deviation = slope @ ca.vertcat(deviation, control) + gap
         solution += [control, deviation]
     later = target[NX:] + ca.vertcat(*solution[1:])
     name = f"unbounded_{motion_model}"
@@ -101,18 +102,6 @@ def _backward(slope_sparsity: ca.Sparsity) -> ca.Function:
         "backward",
         [value, value_slope, slope, gap, weight],
         [ca.densify(earlier), earlier_slope, ca.densify(gain), offset],
-    )
-
-
-def _forward() -> ca.Function:
-    """Return (e, [A B], g, K, f) -> (d, next e)."""
-    deviation, gap = ca.SX.sym("e", NX), ca.SX.sym("gap", NX)
-    slope = ca.SX.sym("slope", NX, STAGE)
-    gain, offset = ca.SX.sym("gain", NU, NX), ca.SX.sym("offset", NU)
-    control = gain @ deviation + offset
-    following = slope @ ca.vertcat(deviation, control) + gap
-    return ca.Function(
-        "forward", [deviation, slope, gap, gain, offset], [control, following]
     )
 
 
