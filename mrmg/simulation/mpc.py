@@ -13,7 +13,7 @@ Riccati recursion; only a solution that breaks a bound is found anew with them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import casadi as ca
@@ -53,7 +53,6 @@ class TrackingMpc:
         """Set up the problem for a robot of `model`."""
         kind = (model.motion_model, model.wheelbase_m)
         self._lower, self._upper = _bounds(model.limits)
-        self._limits = model.limits
         self.branch = "riccati"
         self._deviation = np.zeros(SIZE)
         self._guess = np.zeros(SIZE)
@@ -61,10 +60,10 @@ class TrackingMpc:
         self._solution = np.zeros(SIZE)
         question = (self._guess, self._target)
         bounds = (self._lower, self._upper)
-        self._solve_unbounded = _BufferedCall(
+        self._solve_unbounded = _in_place(
             _unbounded_solver(*kind), question, self._solution
         )
-        self._solve_bounded = _BufferedCall(
+        self._solve_bounded = _in_place(
             _solver(*kind), (*question, *bounds), self._solution
         )
 
@@ -75,7 +74,9 @@ class TrackingMpc:
         stages[:, NX:] = (reference[1:, 3:] - reference[:-1, 3:]) / HORIZON_STEP_S
         self._target[-NX:] = reference[-1]
         np.add(self._target, self._deviation, out=self._guess)
-        self._fix_first_state(state)
+        first = state.clip(self._lower[-NX:], self._upper[-NX:])
+        for each in (self._lower, self._upper, self._guess):
+            each[:NX] = first
         if not self._solve():
             self._deviation[:] = 0.0
             return np.zeros(NU)
@@ -98,34 +99,21 @@ class TrackingMpc:
         above, below = self._solution >= self._lower, self._solution <= self._upper
         return bool((above & below).all())
 
-    def _fix_first_state(self, state: np.ndarray) -> None:
-        limits = self._limits
-        self._lower[:NX] = state
-        self._lower[3] = min(max(state[3], limits.v_min_m_s), limits.v_max_m_s)
-        self._lower[4] = min(max(state[4], -limits.w_max), limits.w_max)
-        self._upper[:NX] = self._lower[:NX]
-        self._guess[:NX] = self._lower[:NX]
 
+def _in_place(
+    function: ca.Function, arguments: Sequence[np.ndarray], result: np.ndarray
+) -> Callable[[], None]:
+    """Return what calls a CasADi function on arrays and writes its only result."""
+    buffer, evaluate = function.buffer()
+    for index, array in enumerate(arguments):
+        buffer.set_arg(index, memoryview(array))  # type: ignore
+    buffer.set_res(0, memoryview(result))  # type: ignore
 
-class _BufferedCall:
-    """A CasADi function that works on arrays in place."""
+    # The buffer must outlive the calls that work on it.
+    def call(_buffer: ca.FunctionBuffer = buffer) -> None:
+        evaluate()
 
-    def __init__(
-        self,
-        function: ca.Function,
-        arguments: Sequence[np.ndarray],
-        result: np.ndarray,
-    ) -> None:
-        """Bind the function's arguments and its only result."""
-        # The buffer must outlive the call that works on it.
-        self._buffer, self._call = function.buffer()
-        for index, array in enumerate(arguments):
-            self._buffer.set_arg(index, memoryview(array))  # type: ignore
-        self._buffer.set_res(0, memoryview(result))  # type: ignore
-
-    def __call__(self) -> None:
-        """Work out the result."""
-        self._call()
+    return call
 
 
 def _bounds(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
