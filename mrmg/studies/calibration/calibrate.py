@@ -185,19 +185,13 @@ def fit_legs(
 
 
 def _estimates(model: RobotModel, fit: LinearFit) -> dict[str, Estimate]:
-    was: dict[str, tuple[float | None, KeyPath | None]] = {
-        "rolling_coefficient": (model.rolling_coefficient, ("rolling_coefficient",)),
-        "turning_coefficient": (model.turning_coefficient, ("turning_coefficient",)),
-        "effective_mass_kg": (model.effective_mass_kg, None),
-        "yaw_inertia_kg_m2": (None, None),
-    }
     estimates = {
         name: Estimate(
             value=float(value),
             half_width=float(half_width),
             unit=UNITS[name],
-            was=was[name][0],
-            key=was[name][1],
+            was=getattr(model, name, None),
+            key=(name,) if name.endswith("_coefficient") else None,
         )
         for name, value, half_width in zip(
             PARAMETERS, fit.value, fit.half_width, strict=True
