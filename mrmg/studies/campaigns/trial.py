@@ -7,7 +7,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from mrmg.studies.outcomes import assess_trial
 
 if TYPE_CHECKING:
     from mrmg.energy.audit_record import EnergyAudit
+    from mrmg.planning import PlannerParams
     from mrmg.simulation.log import ExecutionLog
     from mrmg.verification.verdict import Verdict
 
@@ -104,11 +105,14 @@ def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
     scene = arguments.scene(source.scene(arguments.seed, order.changes))
     require_drivable(scene.robots)
     began = time.perf_counter()
-    compile_kernels(planner_params(arguments).planner)
+    params = planner_params(arguments)
+    compile_kernels(params.planner)
     compile_s = time.perf_counter() - began
     if order.with_run:
         return _made_by_run(scene, arguments)
-    planned, plan_s = _planned(_Planning(scene, arguments))
+    planned, plan_s = _planned(
+        scene, arguments.seed, params, arguments.skip_unreachable
+    )
     result = _of_planning(scene, planned.status.value, planned.reason)
     if planned.plan is None:
         return {"result": result, "time_s": {"compile": compile_s, "plan": plan_s}}
@@ -188,30 +192,15 @@ def _of_drive(
     }
 
 
-@dataclass(frozen=True, slots=True)
-class _Planning:
-    """What is planned; equal where the same plan comes of it."""
-
-    scene: Scene = field(compare=False)
-    arguments: RunArguments = field(compare=False)
-    digest: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        deciding = [self.scene.digest, *self.arguments.planning()]
-        object.__setattr__(self, "digest", str(deciding))
-
-
 @lru_cache(maxsize=8)
-def _planned(planning: _Planning) -> tuple[PlanResult, float]:
+def _planned(
+    scene: Scene, seed: int, params: PlannerParams, skip_unreachable: bool
+) -> tuple[PlanResult, float]:
     """Return a plan, which trials that differ in the drive share, and its time [s]."""
     from mrmg.planning import plan_mission
 
     began = time.perf_counter()
-    arguments = planning.arguments
     found = plan_mission(
-        planning.scene,
-        seed=arguments.seed,
-        params=planner_params(arguments),
-        skip_unreachable=arguments.skip_unreachable,
+        scene, seed=seed, params=params, skip_unreachable=skip_unreachable
     )
     return found, time.perf_counter() - began
