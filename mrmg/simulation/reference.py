@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import PPoly
 
 from mrmg.motion.dynamics import DERIVATIVES, NX, SPEED_STATES
-from mrmg.plans import Plan, Trajectory
+from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
@@ -26,27 +27,26 @@ class FleetReference:
 
     def __init__(self, scene: Scene, plan: Plan) -> None:
         """Interpolate the trajectories of `plan`, in the scene's order of robots."""
-        pieces = [
-            _pieces(robot.model, plan.trajectory(robot.id)) for robot in scene.robots
-        ]
+        items = [plan.trajectory(robot.id) for robot in scene.robots]
+        state = np.stack([item.state for item in items], axis=1)
+        # A plan without steps is one step of standing still.
+        state = np.repeat(state, 2, axis=0) if len(state) == 1 else state
+        each = zip(scene.robots, state.swapaxes(0, 1), strict=True)
+        slope = np.stack([_slope(robot.model, own) for robot, own in each], axis=1)
+        chord, before, after = np.diff(state, axis=0) / plan.dt_s, slope[:-1], slope[1:]
+        # Not by `CubicHermiteSpline`, which refuses states that are no numbers.
+        third = (before + after - 2.0 * chord) / plan.dt_s**2
+        second = (3.0 * chord - 2.0 * before - after) / plan.dt_s
+        cubics = np.stack([third, second, before, state[:-1]])
+        cubics[:2, ..., 3:] = 0.0
+        cubics[2, ..., 3:] = chord[..., 3:]
+        self._states = PPoly(cubics, plan.dt_s * np.arange(len(state)))
         self._is_speed = speed_states(scene)
-        self._steps = pieces[0].shape[1]
-        self._dt_s = plan.dt_s
         self.duration_s = plan.makespan_s
-        self._cubics = np.stack(pieces, axis=2).reshape(4, self._steps, -1)
 
-    def at(self, plan_time_s: np.ndarray) -> np.ndarray:
-        """Return the states at the given plan times, shape (n,) -> (n, R, 5)."""
-        time_s = np.minimum(plan_time_s, self.duration_s)
-        piece = np.minimum((time_s / self._dt_s).astype(int), self._steps - 1)
-        since_s = (time_s - self._dt_s * piece)[:, None]
-        third, second, first, start = self._cubics[:, piece]
-        states = ((third * since_s + second) * since_s + first) * since_s + start
-        return np.asarray(states.reshape(len(time_s), -1, NX))
-
-    def at_once(self, plan_time_s: float) -> np.ndarray:
-        """Return the states at one plan time, shape (R, 5)."""
-        return np.asarray(self.at(np.array([plan_time_s]))[0])
+    def at(self, plan_time_s: float | np.ndarray) -> np.ndarray:
+        """Return the states at one plan time, shape (R, 5), or at n, (n, R, 5)."""
+        return np.asarray(self._states(np.minimum(plan_time_s, self.duration_s)))
 
     def paced(
         self, clock_s: float, rate: float, period_s: float, count: int
@@ -70,29 +70,9 @@ def speed_states(scene: Scene) -> np.ndarray:
     )
 
 
-def _pieces(model: RobotModel, item: Trajectory) -> np.ndarray:
-    """Return the cubics of one trajectory, highest power first, shape (4, n, 5)."""
+def _slope(model: RobotModel, state: np.ndarray) -> np.ndarray:
+    """Return how states change while the controls are zero, both of shape (n, 5)."""
     derivative = DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan)
-    # A plan without steps is one step of standing still.
-    state = np.repeat(item.state, 2, axis=0) if len(item.state) == 1 else item.state
-    dt_s = item.dt_s
     zero = np.zeros(len(state))
-    slope = np.stack(
-        derivative(
-            state[:, 2], state[:, 3], state[:, 4], zero, zero, model.wheelbase_m
-        ),
-        axis=1,
-    )
-    start, chord = state[:-1], np.diff(state, axis=0) / dt_s
-    before, after = slope[:-1], slope[1:]
-    cubic = np.stack(
-        [
-            (before + after - 2.0 * chord) / dt_s**2,
-            (3.0 * chord - 2.0 * before - after) / dt_s,
-            before,
-            start,
-        ]
-    )
-    cubic[:2, :, 3:] = 0.0
-    cubic[2, :, 3:] = chord[:, 3:]
-    return cubic
+    moved = derivative(*state.T[2:], zero, zero, model.wheelbase_m)
+    return np.stack(moved, axis=1)

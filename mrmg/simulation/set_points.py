@@ -42,7 +42,7 @@ class SetPoints:
         self._turns = self._is_speed[:, 1].tolist()
         self._reference, self._controllers = reference, controllers
         self._correction = np.zeros((len(self._limits), 2))
-        start = reference.at_once(0.0)[:, 3:]
+        start = reference.at(0.0)[:, 3:]
         self._asked = [(v, w) for v, w in start.tolist()]
         self.now, self.following = start, start.copy()
 

@@ -155,7 +155,7 @@ class _Run:
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
         steer = self._set_points.following[:, 1]
         self._actuation = Actuation(disturbance, steer, self._period_s)
-        self._coming = self._reference.at_once(0.0)
+        self._coming = self._reference.at(0.0)
         self._settle()
         self._observe()
         self._record()
@@ -224,7 +224,7 @@ class _Run:
         self._set_points.follow(self._reference)
         self._clock.time_s = orders.clock_s
         self._ending.restart()
-        self._planned = self._reference.at_once(orders.clock_s)
+        self._planned = self._reference.at(orders.clock_s)
 
     def fraction(self) -> float:
         """Return the share of the plan's time that is done."""
@@ -293,9 +293,7 @@ class _Run:
             self._set_points.correct(
                 self._sensing.state, clock.time_s, clock.rate, self._calls
             )
-        self._coming = self._reference.at_once(
-            clock.time_s + clock.rate * self._period_s
-        )
+        self._coming = self._reference.at(clock.time_s + clock.rate * self._period_s)
         self._set_points.advance(
             self._sensing.axle_speed_m_s,
             self._planned,

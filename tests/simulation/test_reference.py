@@ -76,7 +76,7 @@ def test_one_time_is_as_good_as_many(scene: Scene, plan: Plan) -> None:
     reference = FleetReference(scene, plan)
     times = np.concatenate([np.linspace(0.0, 31.0, 200), plan.trajectories[0].time_s])
     for time_s, states in zip(times.tolist(), reference.at(times), strict=True):
-        np.testing.assert_array_equal(reference.at_once(time_s), states)
+        np.testing.assert_array_equal(reference.at(time_s), states)
 
 
 def test_order_is_that_of_the_scene(scene: Scene, plan: Plan) -> None:
