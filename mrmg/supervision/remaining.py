@@ -165,9 +165,15 @@ def _home(entry: dict[str, Any], robot: Robot) -> dict[str, Any]:
     return {"finish": {"circle": circle}}
 
 
-def is_over(rest: Scene) -> bool:
-    """Return whether nothing is left to do: no goal, and all robots where they end."""
-    return not rest.goals and all(
-        robot.finish is None or is_at(robot.finish, np.array([robot.pose]))[0]
-        for robot in rest.robots
+def is_over(scene: Scene, condition: FleetCondition) -> bool:
+    """Return whether nothing is left to do: no goal, and all robots where they end.
+
+    Args:
+        scene: the mission as it began.
+        condition: of the fleet, at rest.
+    """
+    return condition.visited >= {goal.id for goal in scene.goals} and all(
+        is_at(robot.finish, np.array([condition.pose[robot.id]]))[0]
+        for robot in scene.robots
+        if robot.finish is not None and robot.id not in condition.out_of_service
     )

@@ -119,11 +119,11 @@ class Replanner:
 
     def _tried(self, left: FleetCondition, number: int, draws: int) -> Replan:
         """Return a plan for all goals that are left, or those proven impossible."""
+        if is_over(self.scene, left):
+            return Replan()
         last = remaining_scene(
             self.scene, left, reserve_share=RESERVES[-1], timely=False
         )
-        if is_over(last):
-            return Replan()
         limited = math.isfinite(self.scene.time_limit_s)
         # Stays under way are brought to their end, or else begun anew.
         tries = [

@@ -20,7 +20,6 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.energy.text import energy_text
-from mrmg.energy.visits import is_at
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Event, Observation, Orders
@@ -29,7 +28,7 @@ from mrmg.supervision.course import Course
 from mrmg.supervision.faults import StopFault
 from mrmg.supervision.history import History
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.remaining import FleetCondition
+from mrmg.supervision.remaining import FleetCondition, is_over
 from mrmg.supervision.replanning import Replan, Replanner
 
 TRACKED_M = 0.1
@@ -164,7 +163,7 @@ class FleetSupervisor:
         missing = [
             goal.id for goal in self._scene.goals if goal.id not in condition.visited
         ]
-        if self._is_done(condition):
+        if is_over(self._scene, condition):
             self._report(now, "rest", "", "finish", "all goals have been visited")
             return None
         over = self._why_over(missing)
@@ -199,13 +198,6 @@ class FleetSupervisor:
             self._report(now, "rest", "", "give_up", reason)
         self._report(now, "rest", "", "replan", _said(outcome, len(missing), condition))
         return Orders(plan=self.course.plan, clock_s=step * self.course.plan.dt_s)
-
-    def _is_done(self, condition: FleetCondition) -> bool:
-        return len(condition.visited) == len(self._scene.goals) and all(
-            is_at(robot.finish, np.array([condition.pose[robot.id]]))[0]
-            for robot in self._scene.robots
-            if robot.finish is not None and robot.id not in condition.out_of_service
-        )
 
     def _why_over(self, missing: Sequence[str]) -> str:
         """Return why the mission ends where the fleet rests; "" if it need not."""

@@ -179,10 +179,10 @@ def test_a_mission_is_over_when_all_is_visited_and_all_are_home(
     done = replace(condition, visited=frozenset({"g1", "g2", "g3"}))
     home = replace(done, pose={**done.pose, "r1": (5.3, 18.2, 1.0)})
     away = replace(done, out_of_service=frozenset({"r1"}))
-    assert not is_over(remaining_scene(scene, condition))
-    assert not is_over(remaining_scene(scene, done))
-    assert is_over(remaining_scene(scene, home))
-    assert is_over(remaining_scene(scene, away))
+    assert not is_over(scene, condition)
+    assert not is_over(scene, done)
+    assert is_over(scene, home)
+    assert is_over(scene, away)
 
 
 def test_what_is_left_of_the_time_limit_still_holds(
