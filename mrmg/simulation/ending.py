@@ -34,6 +34,11 @@ class Ending:
         self._data, self._is_speed = data, is_speed
         self.finished_s, self._got_on_s = np.inf, 0.0
 
+    @property
+    def stalled_s(self) -> float:
+        """How long the fleet has hardly got on with its plan."""
+        return float(self._data.time - self._got_on_s)
+
     def restart(self) -> None:
         """Expect another plan from now on."""
         self.finished_s, self._got_on_s = np.inf, float(self._data.time)
@@ -64,7 +69,7 @@ class Ending:
         pairs = zip(state.tolist(), planned.tolist(), strict=True)
         if any(math.dist(now[:2], meant[:2]) > _LOST_M for now, meant in pairs):
             return "lost"
-        if self._data.time - self._got_on_s > _LONGEST_STALL_S:
+        if self.stalled_s > _LONGEST_STALL_S:
             return "stalled"
         if self._data.time - self.finished_s > _LONGEST_REST_S:
             return "restless"

@@ -211,6 +211,7 @@ class _Run:
             time_s=float(self.data.time),
             clock_s=self._clock_s(),
             rate=self._clock.rate,
+            stalled_s=self._ending.stalled_s,
             state=self._sensing.state,
             planned=self._planned,
             work_J=self._fleet.work.work_J,

@@ -39,6 +39,7 @@ class Observation:
         time_s: simulated time.
         clock_s: plan time the fleet's clock has reached.
         rate: plan seconds per simulated second.
+        stalled_s: how long the fleet has hardly got on with its plan.
         state: seen (x, y, theta, v, psi), shape (R, 5).
         planned: the plan at `clock_s`, shape (R, 5).
         work_J: returns the work of the drives in every tick so far, driving and
@@ -49,6 +50,7 @@ class Observation:
     time_s: float
     clock_s: float
     rate: float
+    stalled_s: float
     state: np.ndarray
     planned: np.ndarray
     work_J: Callable[[], np.ndarray]

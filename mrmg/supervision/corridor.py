@@ -27,7 +27,6 @@ ENERGY_FLOOR = 0.01
 """Further excess tolerated, as a share of the capacity: what is measured over a few
 metres is uncertain."""
 
-_STANDING_RATE = 0.1
 _CHANCE_M = 1.0
 """Way over plain ground; by its energy planned and measured may differ by chance."""
 
@@ -47,32 +46,22 @@ class Departure:
     message: str
 
 
-class TrackingCorridor:
-    """Reports when a robot is off its plan, or keeps the whole fleet waiting."""
+def tracking_departure(robots: Sequence[str], now: Observation) -> Departure | None:
+    """Return which robot is off its plan, or keeps the whole fleet waiting, if any.
 
-    def __init__(self, robots: Sequence[str]) -> None:
-        """Start with a fleet that gets on."""
-        self._robots = robots
-        self._got_on_s = 0.0
-
-    def reset(self, time_s: float) -> None:
-        """Begin anew."""
-        self._got_on_s = time_s
-
-    def left(self, now: Observation) -> Departure | None:
-        """Return how the corridor was left, if it was."""
-        worst = int(now.off_m.argmax())
-        robot, off_m = self._robots[worst], now.off_m[worst]
-        if off_m > OFF_M:
-            text = f"{robot} is {off_m:.2f} m off its plan"
-            return Departure("tracking", robot, text)
-        if now.rate > _STANDING_RATE:
-            self._got_on_s = now.time_s
-        waited_s = now.time_s - self._got_on_s
-        if waited_s > STALL_S:
-            text = f"the fleet has waited {waited_s:.1f} s for {robot}"
-            return Departure("tracking", robot, text)
-        return None
+    Args:
+        robots: ids, in the scene's order.
+        now: the fleet.
+    """
+    worst = int(now.off_m.argmax())
+    robot, off_m = robots[worst], now.off_m[worst]
+    if off_m > OFF_M:
+        text = f"{robot} is {off_m:.2f} m off its plan"
+        return Departure("tracking", robot, text)
+    if now.stalled_s > STALL_S:
+        text = f"the fleet has waited {now.stalled_s:.1f} s for {robot}"
+        return Departure("tracking", robot, text)
+    return None
 
 
 class EnergyCorridor:

@@ -23,7 +23,7 @@ from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Event, Observation, Orders
-from mrmg.supervision.corridor import Departure, EnergyCorridor, TrackingCorridor
+from mrmg.supervision.corridor import Departure, EnergyCorridor, tracking_departure
 from mrmg.supervision.course import Course
 from mrmg.supervision.faults import StopFault
 from mrmg.supervision.history import History
@@ -86,7 +86,6 @@ class FleetSupervisor:
         self._meters = {robot.id: RobotMeter(scene, robot) for robot in scene.robots}
         for name, meter in self._meters.items():
             meter.battery.follow(plan.tours[name])
-        self._tracking = TrackingCorridor(self._robots)
         self._energy = EnergyCorridor(self.course)
         self._history = History(scene)
         self._stopping = False
@@ -134,7 +133,7 @@ class FleetSupervisor:
         """Return the corridor that was left, if replanning could help."""
         if self._replanner is None or len(self.replans) >= MOST_REPLANS or now.ended:
             return None
-        departure = self._tracking.left(now)
+        departure = tracking_departure(self._robots, now)
         if departure is None and self._history.unmetered_s == 0.0:
             departure = self._energy.left(now.clock_s, self._meters)
         return departure
@@ -193,7 +192,6 @@ class FleetSupervisor:
         for name, meter in self._meters.items():
             meter.battery.follow(outcome.plan.tours.get(name, ()))
         self._energy.follow(self.course, step, self._meters, outcome.scene)
-        self._tracking.reset(now.time_s)
         for reason in dict.fromkeys(outcome.given_up.values()):
             self._report(now, "rest", "", "give_up", reason)
         self._report(now, "rest", "", "replan", _said(outcome, len(missing), condition))

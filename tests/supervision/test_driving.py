@@ -323,6 +323,7 @@ def test_who_touches_something_at_its_finish_is_done(
             time_s=0.5 + 0.02 * tick,
             clock_s=0.5,
             rate=1.0,
+            stalled_s=0.0,
             state=pushed,
             planned=planned,
             work_J=lambda seen=work_J: seen,
