@@ -27,15 +27,12 @@ class Course:
     Attributes:
         scene: the mission as it began.
         plan: the joined plan, of all robots of the scene.
-        parts_J: planned energy of each step by robot, shape (n, len(PARTS)) each; under
-            the energy model that was believed when the step was planned.
         charge_J: (step, battery contents by robot) from which the batteries were
             reckoned on, in order.
     """
 
     scene: Scene
     plan: Plan
-    parts_J: Mapping[str, np.ndarray]
     charge_J: tuple[tuple[int, Mapping[str, float]], ...]
 
     @staticmethod
@@ -44,9 +41,6 @@ class Course:
         return Course(
             scene=scene,
             plan=plan,
-            parts_J={
-                item.robot: step_energy_parts(scene, item) for item in plan.trajectories
-            },
             charge_J=(
                 (0, {robot.id: robot.battery.start_J for robot in scene.robots}),
             ),
@@ -56,6 +50,18 @@ class Course:
     def steps(self) -> int:
         """Number of steps."""
         return len(self.plan.trajectories[0].control)
+
+    @property
+    def parts_J(self) -> dict[str, np.ndarray]:
+        """Planned energy of each step by robot, shape (n, len(PARTS)) each.
+
+        It is that of the rolling resistance believed when the step was planned.
+        """
+        factors = self.plan.rolling_factor
+        return {
+            item.robot: step_energy_parts(self.scene, item, factors.get(item.robot))
+            for item in self.plan.trajectories
+        }
 
     def stopped(
         self,
@@ -78,22 +84,22 @@ class Course:
         longest = max(len(control) for _, control in motions.values())
         length = longest + round(pause_s / self.plan.dt_s)
         motions = {name: held(*motion, length) for name, motion in motions.items()}
-        return self._continued(step, motions, self.scene).with_tours(self.plan.tours)
+        return self._continued(step, motions, {}).with_tours(self.plan.tours)
 
     def resumed(
         self,
-        rest: Scene,
         plan: Plan,
         charge_J: Mapping[str, float],
+        rolling_factor: Mapping[str, float],
         tours: Mapping[str, Sequence[str]],
     ) -> Course:
         """Return the course that goes on by a new plan from its end.
 
         Args:
-            rest: the remaining scene the plan was made for; robots that it does not
-                have stay where they are.
-            plan: from where the fleet stands.
+            plan: from where the fleet stands; robots that it does not have stay there.
             charge_J: battery contents the plan starts from, by robot.
+            rolling_factor: by which the rolling resistance was believed to differ from
+                the models' when it was made, by robot.
             tours: of the whole course.
         """
         planned = {item.robot: item for item in plan.trajectories}
@@ -105,7 +111,8 @@ class Course:
                 motions[item.robot] = (new.state, new.control)
             else:
                 motions[item.robot] = held(item.state[-1:], np.zeros((0, 2)), length)
-        joined = self._continued(self.steps, motions, rest)
+        believed = {name: rolling_factor[name] for name in planned}
+        joined = self._continued(self.steps, motions, believed)
         anew = (*self.charge_J, (self.steps, dict(charge_J)))
         return replace(joined, charge_J=anew).with_tours(tours)
 
@@ -113,12 +120,12 @@ class Course:
         """Return the course with the given tours, and all that follows from them."""
         visits: list[Visit] = []
         entries: list[LedgerEntry] = []
-        content_J = {}
+        content_J, parts_J = {}, self.parts_J
         for item in self.plan.trajectories:
             robot = item.robot
             anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
             own, content_J[robot], legs = visits_and_energy(
-                self.scene, item, tours[robot], self.parts_J[robot], anew
+                self.scene, item, tours[robot], parts_J[robot], anew
             )
             visits += own
             entries += legs
@@ -136,26 +143,21 @@ class Course:
         self,
         step: int,
         motions: Mapping[str, Motion],
-        believed: Scene,
+        rolling_factor: Mapping[str, float],
     ) -> Course:
         """Return the course up to `step`, then the given states and controls.
 
         Args:
             step: whose state is replaced by the first of the new ones.
             motions: states, shape (n + 1, 5), and controls, shape (n, 2), by robot.
-            believed: whose energy models the new steps are reckoned with.
+            rolling_factor: by which the new steps' rolling resistance is believed to
+                differ from the model's, by robot, where it does.
         """
-        known = {robot.id for robot in believed.robots}
-        trajectories, parts_J, factors = [], {}, {}
+        trajectories, factors = [], {}
         for item in self.plan.trajectories:
             state, control = motions[item.robot]
-            new = replace(item, state=state.copy(), control=control.copy())
-            scene = believed if item.robot in known else self.scene
-            parts_J[item.robot] = np.concatenate(
-                [self.parts_J[item.robot][:step], step_energy_parts(scene, new)]
-            )
             before = self.plan.rolling_factor.get(item.robot, np.ones(step))
-            factor = _rolling_factor(self.scene, scene, item.robot)
+            factor = rolling_factor.get(item.robot, 1.0)
             factors[item.robot] = np.concatenate(
                 [before[:step], np.full(len(control), factor)]
             )
@@ -169,12 +171,4 @@ class Course:
         plan = replace(
             self.plan, trajectories=tuple(trajectories), rolling_factor=factors
         )
-        return replace(self, plan=plan, parts_J=parts_J)
-
-
-def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
-    """Return a robot's rolling resistance as it is believed over that of its model."""
-    modelled, known = (
-        of.robot(robot).model.energy_model.rolling_force_N for of in (scene, believed)
-    )
-    return known / modelled
+        return replace(self, plan=plan)

@@ -187,7 +187,7 @@ class FleetSupervisor:
             for name, targets in entered.items()
         }
         self.course = self.course.resumed(
-            outcome.scene, outcome.plan, condition.energy_J, tours
+            outcome.plan, condition.energy_J, condition.rolling_factor, tours
         )
         for name, meter in self._meters.items():
             meter.battery.follow(outcome.plan.tours.get(name, ()))
