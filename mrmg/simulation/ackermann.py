@@ -53,11 +53,6 @@ class AckermannChassis(Chassis):
         tan_steer = 0.5 * (tan_wheel / (1.0 + self._swing * tan_wheel)).sum(axis=1)
         return np.asarray(np.arctan(tan_steer))
 
-    def axle_speed_m_s(self) -> np.ndarray:
-        """Return the speed the rear axle rolls at, shape (K,)."""
-        left, right = self._wheel_rates_rad_s().T
-        return np.asarray(0.5 * self._radius_m * (left + right))
-
     def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
         """Set the dry friction of the rear axle; its differential is free of any."""
         torque = 0.5 * self._radius_m * resistance_N

@@ -39,9 +39,13 @@ class Chassis:
     def apply(self, step: int) -> None:
         """Give the actuators the controls of a physics step; held ones need nothing."""
 
-    def _wheel_rates_rad_s(self) -> np.ndarray:
-        """Return how fast each driven wheel turns, left and right, shape (K, 2)."""
-        return np.asarray(self._data.qvel[self._wheels_v])
+    def axle_speed_m_s(self) -> np.ndarray:
+        """Return the speed the axle rolls at, shape (K,)."""
+        return np.asarray(self._wheel_speed_m_s().mean(axis=1))
+
+    def _wheel_speed_m_s(self) -> np.ndarray:
+        """Return the speed each driven wheel rolls at, left and right, shape (K, 2)."""
+        return np.asarray(self._data.qvel[self._wheels_v] * self._radius_m[:, None])
 
 
 def part_ids(

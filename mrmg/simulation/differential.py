@@ -64,10 +64,6 @@ class DifferentialChassis(Chassis):
         """Return the true omega, shape (K,)."""
         return np.asarray(self._data.qvel[self._yaw_v])
 
-    def axle_speed_m_s(self) -> np.ndarray:
-        """Return the speed the axle rolls at, shape (K,)."""
-        return np.asarray(self._wheel_speed_m_s().mean(axis=1))
-
     def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
         """Set the dry friction of both tendons."""
         friction = np.stack([resistance_N, swing_N], axis=1)
@@ -99,10 +95,6 @@ class DifferentialChassis(Chassis):
         swing_N = moment_Nm / self._track_m
         wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
         self._drives.command(wheels_N.ravel())
-
-    def _wheel_speed_m_s(self) -> np.ndarray:
-        """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
-        return np.asarray(self._wheel_rates_rad_s() * self._radius_m[:, None])
 
     def _inertia_about_axle(self) -> tuple[np.ndarray, np.ndarray]:
         """Return yaw inertias about the axles' middles, and masses times their leads.
