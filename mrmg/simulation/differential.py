@@ -18,7 +18,7 @@ from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
 from mrmg.simulation.chassis import Chassis, part_ids
-from mrmg.simulation.drive import SpeedLoop, usable_grip_N
+from mrmg.simulation.drive import SpeedLoop
 from mrmg.simulation.drives import ForceDrives
 
 _LEVEL = 1e-3
@@ -49,7 +49,9 @@ class DifferentialChassis(Chassis):
         self._turning_N = np.array(
             [item.energy_model.turning_force_N for item in models]
         )
-        grip_N = np.array([usable_grip_N(item) for item in models])
+        grip_N = np.array(
+            [item.usable_grip * item.mass_kg * GRAVITY_M_S2 for item in models]
+        )
         spin = np.array([item.wheel_inertia_kg_m2 for item in models])
         wheels_kg_m2 = 0.5 * spin * (self._track_m / self._radius_m) ** 2
         self._body = part_ids(model.body, robots, (CHASSIS,))[:, 0]
@@ -58,6 +60,9 @@ class DifferentialChassis(Chassis):
             inertia=yaw_kg_m2 + wheels_kg_m2,
             # Errors of the resistance to turning must be within reach, too.
             limit=grip_N * self._track_m / 2 + self._turning_N * self._track_m,
+            # A mass ahead of the axle wants to go down a cross slope.
+            weight=self._lead_kg_m * GRAVITY_M_S2,
+            level=_LEVEL,
         )
 
     def fifth_state(self) -> np.ndarray:
@@ -86,12 +91,11 @@ class DifferentialChassis(Chassis):
             w_from,
             w_to,
             turning_multiplier * self._turning_N * self._track_m,
-            np.abs(cross_slope) > _LEVEL,
+            cross_slope,
             steps * self._model.opt.timestep,
         )
-        # A mass ahead of the axle wants to go straight on, and down a cross slope.
+        # A mass ahead of the axle wants to go straight on.
         moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)
-        moment_Nm += self._lead_kg_m * GRAVITY_M_S2 * cross_slope
         swing_N = moment_Nm / self._track_m
         wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
         self._drives.command(wheels_N.ravel())

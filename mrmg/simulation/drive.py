@@ -14,7 +14,6 @@ import math
 import numpy as np
 
 from mrmg.energy.model import GRAVITY_M_S2
-from mrmg.scene.robot_model import DRIVEN_LOAD_SHARE, GRIP_SHARE, RobotModel
 from mrmg.scene.types import Scene
 
 PROPORTIONAL_PER_S = 4.0
@@ -33,14 +32,23 @@ _STANDSTILL_M_S = 1e-4
 class SpeedLoop:
     """Control of several speeds at once."""
 
-    def __init__(self, inertia: np.ndarray, limit: np.ndarray) -> None:
+    def __init__(
+        self,
+        inertia: np.ndarray,
+        limit: np.ndarray,
+        weight: np.ndarray,
+        level: float = 0.0,
+    ) -> None:
         """Control speeds that are all zero at first.
 
         Args:
             inertia: mass [kg] or moment of inertia [kg m^2], shape (n,).
             limit: bound of the part that accelerates [N or N m], shape (n,).
+            weight: what a slope takes, by its sine [N or N m], shape (n,).
+            level: sine of the slope that friction holds.
         """
         self._inertia, self._limit = inertia.tolist(), limit.tolist()
+        self._weight, self._level = weight, level
         self._integral_m_s2 = [0.0] * len(inertia)
 
     def force(
@@ -49,21 +57,24 @@ class SpeedLoop:
         wanted: np.ndarray,
         following: np.ndarray,
         resistance: np.ndarray,
-        brakes: np.ndarray,
+        slope: np.ndarray,
         period_s: float,
     ) -> np.ndarray:
         """Return the force [N] or moment [N m] to hold for `period_s`, shape (n,).
+
+        On a slope the weight is carried at all times, also by a robot that stands.
 
         Args:
             speed: speed now [m/s or rad/s].
             wanted: speed asked for now.
             following: speed asked for at the end of the period.
             resistance: what the ground takes [N or N m].
-            brakes: where standing takes more than friction, as on a slope.
+            slope: its sine, positive where the weight works against the motion.
             period_s: how long the force will be held.
         """
         forces = []
         bound = INTEGRAL_LIMIT_M_S2
+        brakes = np.abs(slope) > self._level
         values = (speed, wanted, following, resistance, brakes)
         each = zip(*(value.tolist() for value in values), strict=True)
         for index, (now, asked, coming, ground, brake) in enumerate(each):
@@ -81,49 +92,15 @@ class SpeedLoop:
             limit = self._limit[index]
             direction = math.copysign(1.0, middle) if moves else 0.0
             forces.append(direction * ground + min(max(inertial, -limit), limit))
-        return np.array(forces)
+        return np.asarray(forces + self._weight * slope)
 
 
-class DriveControl:
-    """Speed control of all robots along their ways."""
-
-    def __init__(self, scene: Scene) -> None:
-        """Control the robots of `scene`, all at rest."""
-        models = [robot.model for robot in scene.robots]
-        self._weight_N = np.array([item.mass_kg for item in models]) * GRAVITY_M_S2
-        self._loop = SpeedLoop(
-            inertia=np.array([item.effective_mass_kg for item in models]),
-            limit=np.array([usable_grip_N(item) for item in models]),
-        )
-
-    def force_N(
-        self,
-        speed_m_s: np.ndarray,
-        wanted_m_s: np.ndarray,
-        next_m_s: np.ndarray,
-        resistance_N: np.ndarray,
-        slope: np.ndarray,
-        period_s: float,
-    ) -> np.ndarray:
-        """Return the force to hold for `period_s`, shape (R,).
-
-        On a slope the weight is carried at all times, also by a robot that stands.
-
-        Args:
-            speed_m_s: speed of the axle now.
-            wanted_m_s: speed asked for now.
-            next_m_s: speed asked for at the end of the period.
-            resistance_N: force the ground is believed to take.
-            slope: sine of the slope along each heading.
-            period_s: how long the force will be held.
-        """
-        force_N = self._loop.force(
-            speed_m_s, wanted_m_s, next_m_s, resistance_N, slope != 0.0, period_s
-        )
-        return np.asarray(force_N + self._weight_N * slope)
-
-
-def usable_grip_N(model: RobotModel) -> float:
-    """Return how much of the driven axle's grip under its least load is used."""
-    share = DRIVEN_LOAD_SHARE * model.friction_coefficient
-    return GRIP_SHARE * (share * model.mass_kg * GRAVITY_M_S2)
+def drive_control(scene: Scene) -> SpeedLoop:
+    """Return the control of all robots of `scene` along their ways, shape (R,)."""
+    models = [robot.model for robot in scene.robots]
+    weight_N = np.array([item.mass_kg for item in models]) * GRAVITY_M_S2
+    return SpeedLoop(
+        inertia=np.array([item.effective_mass_kg for item in models]),
+        limit=np.array([item.usable_grip for item in models]) * weight_N,
+        weight=weight_N,
+    )

@@ -21,7 +21,7 @@ from mrmg.simulation.controller import Controller, controller_maker
 from mrmg.simulation.controller_calls import ControllerCalls
 from mrmg.simulation.disturbance import Disturbance, DisturbanceRanges
 from mrmg.simulation.disturbed_world import disturb_world, move_starts
-from mrmg.simulation.drive import DriveControl
+from mrmg.simulation.drive import drive_control
 from mrmg.simulation.ending import Ending
 from mrmg.simulation.fleet import Fleet
 from mrmg.simulation.fleet_clock import FleetClock
@@ -141,7 +141,7 @@ class _Run:
         self._is_speed = speed_states(world.scene)
         self._clock = FleetClock(self._is_speed[:, 4])
         self._set_points = SetPoints(world.scene, self._reference, controllers)
-        self._drive = DriveControl(world.scene)
+        self._drive = drive_control(world.scene)
         self._believed = believed_resistance(world.scene)
         self._contacts = ContactWatch(world)
         self._look = partial(self._contacts.look, self.data)
@@ -171,7 +171,7 @@ class _Run:
             level, slope = self._slopes_underfoot.under(seen)
         ground = seen_ground = self._ground(seen, steer)
         believed = self._believed.force_N(ground)
-        wanted = self._drive.force_N(
+        wanted = self._drive.force(
             self._sensing.axle_speed_m_s,
             now[:, 0],
             following[:, 0],
@@ -278,7 +278,7 @@ class _Run:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
         _, slope = self._slopes_underfoot.under(self._fleet.state())
-        parked = self._drive.force_N(still, still, still, still, slope, self._period_s)
+        parked = self._drive.force(still, still, still, still, slope, self._period_s)
         self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
         self._fleet.work.restart()

@@ -12,7 +12,7 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.drive import (
     INTEGRAL_LIMIT_M_S2,
     PROPORTIONAL_PER_S,
-    DriveControl,
+    drive_control,
 )
 
 TICK_S = 0.02
@@ -24,9 +24,9 @@ def scene(driving: SimpleNamespace) -> Scene:
 
 
 def force(scene: Scene, speed: float, now: float, following: float, ground: float = 0):
-    control = DriveControl(scene)
+    control = drive_control(scene)
     values = (np.array([value]) for value in (speed, now, following, ground))
-    return control.force_N(*values, np.zeros(1), TICK_S)[0]
+    return control.force(*values, np.zeros(1), TICK_S)[0]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
@@ -53,14 +53,14 @@ def test_acceleration_is_limited_to_the_grip_resistance_is_not(scene: Scene) -> 
 def test_integral_removes_a_steady_error_and_is_bounded(scene: Scene) -> None:
     """Against a force unknown to the model the loop settles on the asked speed."""
     mass, unknown = scene.robots[0].model.effective_mass_kg, 60.0
-    control = DriveControl(scene)
+    control = drive_control(scene)
     asked, speed, still = np.ones(1), np.ones(1), np.zeros(1)
     for _ in range(400):
-        held = control.force_N(speed, asked, asked, still, still, TICK_S)
+        held = control.force(speed, asked, asked, still, still, TICK_S)
         speed = speed + TICK_S * (held - unknown) / mass
     assert speed[0] == pytest.approx(1.0, abs=1e-3)
     for _ in range(2000):
-        held = control.force_N(
+        held = control.force(
             np.zeros(1), asked, asked, np.zeros(1), np.zeros(1), TICK_S
         )
     bound = PROPORTIONAL_PER_S + INTEGRAL_LIMIT_M_S2
