@@ -15,9 +15,11 @@ import numpy as np
 from mrmg import storage
 from mrmg.columns import data_frame, named, state_columns
 from mrmg.energy.metering import TimedStates
-from mrmg.errors import Fault, IdentityError, of_robot
+from mrmg.errors import Fault, IdentityError, of_robot, require_types
+from mrmg.plan_form import require_form
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.content import ByContent, contents
+from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.supervision import Event
@@ -245,6 +247,20 @@ def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
 
 def _prefixed(word: str, names: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return [(f"{word}_{name}", unit) for name, unit in names]
+
+
+def require_executable(scene: Scene, plan: Plan) -> None:
+    """Refuse what cannot be driven.
+
+    Raises:
+        UsageError: if one is no scene or plan, the plan is malformed, or a robot can
+            only be planned for.
+        IdentityError: if the plan is of another scene.
+    """
+    require_types((scene, Scene), (plan, Plan))
+    require_same_mission(scene, plan)
+    require_form(scene, plan)
+    require_drivable(scene.robots)
 
 
 def require_same_mission(

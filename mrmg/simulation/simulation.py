@@ -10,9 +10,7 @@ import numpy as np
 
 from mrmg.errors import require_known, require_types
 from mrmg.mujoco_import import mujoco
-from mrmg.plan_form import require_form
 from mrmg.plans import Plan
-from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Scene
 from mrmg.simulation.actuation import Actuation
@@ -30,7 +28,7 @@ from mrmg.simulation.ground import (
     TerrainUnderfoot,
     believed_resistance,
 )
-from mrmg.simulation.log import ExecutionLog, package_versions, require_same_mission
+from mrmg.simulation.log import ExecutionLog, package_versions, require_executable
 from mrmg.simulation.plants import DEFAULT_PLANT, PLANTS, plant_of
 from mrmg.simulation.recording import Recording
 from mrmg.simulation.reference import FleetReference, speed_states
@@ -86,12 +84,9 @@ def simulate(
         IdentityError: if the plan is of another scene.
         FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
     """
-    require_types((scene, Scene), (plan, Plan))
+    require_executable(scene, plan)
     maker = controller_maker(controller)
     require_known("plant", plant, PLANTS)
-    require_same_mission(scene, plan)
-    require_form(scene, plan)
-    require_drivable(scene.robots)
     if disturbance is not None:
         require_types((disturbance, Disturbance))
         disturbance.require_fleet(scene)

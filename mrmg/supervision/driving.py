@@ -8,13 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import storage
-from mrmg.errors import require_types
-from mrmg.plan_form import require_form
 from mrmg.planning import PlannerParams
 from mrmg.plans import DRIVEN_PLAN, Plan
-from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
-from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.simulation.log import ExecutionLog, require_executable
 from mrmg.simulation.simulation import simulate
 from mrmg.supervision.faults import checked_faults
 from mrmg.supervision.replanning import Replan, Replanner
@@ -73,10 +70,7 @@ def drive_mission(
             read, the plan is malformed, or a robot can only be planned for.
         IdentityError: if the plan is of another scene.
     """
-    require_types((scene, Scene), (plan, Plan))
-    require_same_mission(scene, plan)
-    require_form(scene, plan)
-    require_drivable(scene.robots)
+    require_executable(scene, plan)
     supervisor = FleetSupervisor(
         scene,
         plan,
