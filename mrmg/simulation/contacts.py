@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from mrmg.mujoco_import import mujoco
+from mrmg.scene.driven_parts import CHASSIS, HULL
 from mrmg.simulation.log import Contact
+from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 
 
@@ -21,7 +23,10 @@ class ContactWatch:
     def __init__(self, world: MujocoWorld) -> None:
         """Watch the robots of `world`."""
         self.contacts: list[Contact] = []
-        self._is_hull, self._label = world.is_hull, world.geom_label
+        model = world.model
+        hulls = [model.geom(f"{robot.id}/{HULL}").id for robot in world.scene.robots]
+        self._is_hull = np.isin(np.arange(model.ngeom), hulls)
+        self._label = [_label(model, geom) for geom in range(model.ngeom)]
         self._touching: set[tuple[str, str]] = set()
         self._seen = b""
 
@@ -47,3 +52,11 @@ class ContactWatch:
                 place = Contact(float(data.time), robot, other, x_m, y_m)
                 self.contacts.append(place)
         self._touching = set(touching)
+
+
+def _label(model: mujoco.MjModel, geom: int) -> str:
+    """Return what a contact calls a geom: an id, or the floor or bounds."""
+    body = model.body(model.body_rootid[model.geom_bodyid[geom]]).name
+    if body == "world":
+        return FLOOR
+    return str(body.removeprefix("obstacle:").removesuffix(f"/{CHASSIS}"))

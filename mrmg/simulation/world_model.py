@@ -10,7 +10,7 @@ import numpy as np
 from mrmg import storage
 from mrmg.errors import Fault, FileError
 from mrmg.mujoco_import import mujoco
-from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
+from mrmg.scene.driven_parts import CHASSIS, require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation import palette, scenery
@@ -28,9 +28,6 @@ class MujocoWorld:
         spec: the editable description.
         model: the compiled model.
         digest: fingerprint of the compiled model.
-        is_hull: whether a geom is the hull of a robot, shape (ngeom,).
-        geom_label: what a contact calls each geom: the id of a robot or obstacle,
-            "bounds" or "floor".
         target_geom: geom of each goal and station, by its id, for recolouring; none
             in a world that is not drawn.
         chassis: body of each robot, in the scene's order, shape (R,).
@@ -40,8 +37,6 @@ class MujocoWorld:
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     digest: str
-    is_hull: np.ndarray
-    geom_label: tuple[str, ...]
     target_geom: dict[str, int]
     chassis: np.ndarray
 
@@ -89,8 +84,6 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
         spec=spec,
         model=model,
         digest=_digest(model),
-        is_hull=_is_hull(scene, model),
-        geom_label=tuple(_label(model, geom) for geom in range(model.ngeom)),
         target_geom={
             target.id: model.geom(f"{target.kind}:{target.id}").id
             for target in scene.targets()
@@ -142,17 +135,3 @@ def _digest(model: mujoco.MjModel) -> str:
     buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return storage.bytes_digest(buffer.tobytes())
-
-
-def _is_hull(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
-    hulls = [model.geom(f"{robot.id}/{HULL}").id for robot in scene.robots]
-    return np.isin(np.arange(model.ngeom), hulls)
-
-
-def _label(model: mujoco.MjModel, geom: int) -> str:
-    body = model.body(model.body_rootid[model.geom_bodyid[geom]]).name
-    if body == "world":
-        return scenery.FLOOR
-    if body == scenery.BOUNDS:
-        return scenery.BOUNDS
-    return str(body.removeprefix("obstacle:").removesuffix(f"/{CHASSIS}"))

@@ -210,9 +210,9 @@ def test_overlapping_and_touching_obstacles_compile(driving: SimpleNamespace) ->
             {"id": "c", "polygon": [[9, 5], [12, 5], [12, 7], [9, 7]]},
         ],
     )
-    world = build_world(scene)
-    solid = [name for name in world.geom_label if name in {"a", "b", "c"}]
-    assert len(solid) == 6
+    model = build_world(scene).model
+    bodies = [model.body(body).name for body in model.geom_bodyid]
+    assert sum(bodies.count(f"obstacle:{name}") for name in "abc") == 6
 
 
 def test_a_broken_mjcf_is_named(driving: SimpleNamespace, tmp_path: Path) -> None:
