@@ -11,8 +11,7 @@ from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
 from mrmg.runs.arguments import RunArguments, recorded
-from mrmg.runs.folder import RunFolder
-from mrmg.runs.paths import why_no_run
+from mrmg.runs.folder import RunFolder, existing
 from mrmg.runs.summary import outcomes_in, summarize
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
@@ -59,7 +58,10 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         RunFolderError: if a file is missing, cannot be read, or is of another scene.
     """
     if not (run_folder / "planning.json").exists():
-        raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
+        existing(run_folder)
+        remedy = f"'mrmg run SCENE --out {run_folder}' goes on with it"
+        fault = Fault("planning.json", f"missing: the run was stopped early; {remedy}")
+        raise RunFolderError(str(run_folder), [fault])
     run = RunFolder(run_folder)
     planning = run.read_json("planning.json", remedy="mrmg plan")
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
@@ -83,12 +85,3 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         arguments=recorded(run),
         **found,
     )
-
-
-def _why_no_record(folder: Path) -> Fault:
-    if not folder.is_dir():
-        return Fault("", why_no_run(folder))
-    if not (folder / "run.json").exists():
-        return Fault("planning.json", "missing: this is not a run folder")
-    remedy = f"'mrmg run SCENE --out {folder}' goes on with it"
-    return Fault("planning.json", f"missing: the run was stopped early; {remedy}")

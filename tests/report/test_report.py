@@ -288,7 +288,7 @@ def test_command_names_a_shipped_scene_only_where_it_is_the_same(
 
 
 def test_a_folder_without_a_plan_is_refused(tmp_path) -> None:
-    with pytest.raises(RunFolderError, match="planning.json: missing: this is not a"):
+    with pytest.raises(RunFolderError, match="not a run folder: it has no run.json"):
         write_report(tmp_path)
     storage.write_json(tmp_path / "run.json", {"format": 1, "arguments": {}})
     with pytest.raises(RunFolderError, match="the run was stopped early; 'mrmg run"):
