@@ -97,20 +97,22 @@ def terrain_estimates(
     model: RobotModel, fit: LawFit, runs: Sequence[LoggedRun], stationary: Estimate
 ) -> tuple[TerrainEstimate, ...]:
     """Return what the runs on each terrain yield; the first terrain is plain ground."""
-    found: list[TerrainEstimate] = []
-    for name in fit.parameters:
+    secants = {
+        name: _secants(model, fit.law, item) for name, item in fit.parameters.items()
+    }
+    plain = next(iter(secants.values()))
+    found = []
+    for name, (rolling, turning) in secants.items():
         rows = fit.rows(name)
         own = [runs[at] for at in rows]
         values = np.array(
             [_secants(model, fit.law, item) for item in fit.without[rows]]
         )
-        rolling, turning = _secants(model, fit.law, fit.parameters[name])
         half = np.where(_excitation(own), _jackknife(values), np.nan).tolist()
         inertia = np.array([_inertia(model, fit, run) for run in own])
         weight = np.array([_jolt(run) for run in own])
         mass = float(inertia @ weight / max(float(weight.sum()), 1e-9))
         mass_half = _spread_of_mean(inertia, weight)
-        first = found[0] if found else None
         found.append(
             TerrainEstimate(
                 name=name,
@@ -126,10 +128,8 @@ def terrain_estimates(
                     unit="kg",
                     was=model.effective_mass_kg,
                 ),
-                multiplier=_ratio(rolling, first.rolling_W_s_m if first else None),
-                turning_multiplier=_ratio(
-                    turning, first.turning_W_s_rad if first else None
-                ),
+                multiplier=_ratio(rolling, plain[0]),
+                turning_multiplier=_ratio(turning, plain[1]),
                 energy_spread=fit.spread(name).deviation,
             )
         )
@@ -209,7 +209,5 @@ def _spread_of_mean(values: np.ndarray, weight: np.ndarray) -> float:
     return t_quantile(effective - 1.0) * math.sqrt(variance)
 
 
-def _ratio(value: float, first: Estimate | None) -> float:
-    if first is None:
-        return 1.0
-    return max(value / max(first.value, 1e-9), 1e-3)
+def _ratio(value: float, plain: float) -> float:
+    return max(max(value, 1e-9) / max(plain, 1e-9), 1e-3)
