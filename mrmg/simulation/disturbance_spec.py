@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from mrmg.errors import UsageError, nearest
+from mrmg.errors import UsageError, require_known
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.simulation.disturbance import (
     DEFAULT_RANGES,
@@ -139,13 +139,8 @@ def _base(word: str) -> DisturbanceRanges | None:
         return DisturbanceRanges()
     if not word.startswith(_FIELD):
         return None
-    terrain = word.removeprefix(_FIELD)
-    if terrain not in FIELD_SPREADS:
-        _refuse(
-            f"no logs are known of terrain '{terrain}'{nearest(terrain, FIELD_SPREADS)}"
-            f"; allowed: {', '.join(_FIELD + name for name in FIELD_SPREADS)}"
-        )
-    return field_ranges(terrain)
+    require_known("disturbance", word, [_FIELD + name for name in FIELD_SPREADS])
+    return field_ranges(word.removeprefix(_FIELD))
 
 
 def _amended(
@@ -153,8 +148,7 @@ def _amended(
 ) -> DisturbanceRanges:
     changes: dict[str, Span] = {}
     for name, value in pairs:
-        if name not in _KEYS:
-            _refuse(f"'{name}' is not known; allowed: {', '.join(_KEYS)}")
+        require_known("disturbance: key", name, _KEYS)
         field = _KEYS[name].field
         if field in changes:
             _refuse(f"'{name}' is given twice")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, require_known
 from mrmg.scene.types import Scene
 
 _FORM = re.compile(r"(?P<robot>[^@\s]+)@(?P<time>[^@\s]+?)s?")
@@ -60,9 +60,5 @@ def checked_faults(scene: Scene, texts: str | Iterable[str]) -> tuple[StopFault,
     faults = sorted(parse_fault(str(text)) for text in texts)
     robots = [robot.id for robot in scene.robots]
     for fault in faults:
-        if fault.robot not in robots:
-            raise UsageError(
-                f"fault '{fault}' names robot '{fault.robot}'; robots of "
-                f"'{scene.name}': {', '.join(robots)}"
-            )
+        require_known(f"fault '{fault}': robot", fault.robot, robots)
     return tuple(faults)

@@ -107,7 +107,7 @@ def test_wrong_faults_are_refused_before_planning(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
-    for fault, named in (("r9@4s", "robots of 'quickstart': r1, r2"), ("r1", "r2@40s")):
+    for fault, named in (("r9@4s", "allowed: r1, r2"), ("r1", "r2@40s")):
         arguments = ["run", "quickstart", "--out", str(out), "--fault", fault]
         assert main(arguments) == ExitCode.USAGE
         assert named in capsys.readouterr().err

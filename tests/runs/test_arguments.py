@@ -100,7 +100,7 @@ def test_the_keywords_of_run_are_its_options() -> None:
         ({"faults": "r1@3s"}, "faults: 'r1@3s' is not a sequence"),
         ({"faults": None}, "faults: None is not a sequence of texts"),
         ({"faults": 5}, "faults: 5 is not a sequence of texts"),
-        ({"fault": ["r9@3s"]}, "robots of 'quickstart': r1, r2"),
+        ({"fault": ["r9@3s"]}, "robot 'r9' .*allowed: r1, r2"),
         ({"budget_s": 3.0, "trees": 2}, "trees is not allowed with budget_s"),
         ({"controller": "mpcc"}, "allowed: mpc"),
         ({"disturb": "weight=+5%"}, "allowed: mass, friction"),

@@ -53,7 +53,7 @@ def test_a_field_has_the_spread_that_was_found_in_logs(terrain: str) -> None:
 
 
 def test_a_field_that_nobody_logged_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"'snwo' .*'snow'.*allowed: field:asphalt, "):
+    with pytest.raises(UsageError, match=r"'field:snwo' .*'field:snow'.*: field:asp"):
         parse_disturbance("field:snwo")
 
 

@@ -60,5 +60,5 @@ def test_one_fault_may_be_a_text_and_others_are_refused(yard: Scene) -> None:
 
 
 def test_unknown_robots_are_named_with_the_known_ones(yard: Scene) -> None:
-    with pytest.raises(UsageError, match=r"'r7'; robots of 'yard': r1, r2"):
+    with pytest.raises(UsageError, match=r"'r7@3s': robot 'r7' .*allowed: r1, r2"):
         checked_faults(yard, ("r7@3s",))
