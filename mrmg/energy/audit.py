@@ -23,9 +23,6 @@ balance, what was measured is worth nothing, and that has failed, too
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import fields
-
 import numpy as np
 
 from mrmg.energy.audit_record import (
@@ -33,7 +30,6 @@ from mrmg.energy.audit_record import (
     MODEL_MISMATCH,
     EnergyAudit,
     RobotAudit,
-    SimulatedVisit,
 )
 from mrmg.energy.balance import balance_of, imbalances
 from mrmg.energy.battery_curves import MeasuredCurve, measured_curves
@@ -105,22 +101,12 @@ def audit(
         causes=tuple(cause for cause, found in failures.items() if found),
         reasons=reasons,
         robots=robots,
-        visits=_simulated_visits(measured),
+        visits=tuple(sorted(visits, key=lambda visit: visit.time_s)),
         goals_visited=goals_visited,
         planned=plan.ledger,
         metered=metered_ledger,
         measured=EnergyLedger(tuple(entries)),
     )
-
-
-def _simulated_visits(curves: Iterable[MeasuredCurve]) -> tuple[SimulatedVisit, ...]:
-    names = [item.name for item in fields(SimulatedVisit)]
-    visits = [
-        SimulatedVisit(**{name: getattr(visit, name) for name in names})
-        for curve in curves
-        for visit in curve.visits
-    ]
-    return tuple(sorted(visits, key=lambda visit: visit.time_s))
 
 
 def believed_rolling(plan: Plan, log: ExecutionLog) -> dict[str, np.ndarray]:

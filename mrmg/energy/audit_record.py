@@ -8,6 +8,7 @@ from pathlib import Path
 from mrmg import storage
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.errors import of_robot
+from mrmg.plans import Visit
 
 AUDIT_FORMAT = 1
 AUDIT_FILE = "audit.json"
@@ -17,25 +18,6 @@ MODEL_MISMATCH = "model mismatch"
 
 ENERGY_IMBALANCE = "energy imbalance"
 """Cause of a mission whose measured energies cannot be trusted."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatedVisit:
-    """A robot's entering of a goal or station in the simulation.
-
-    Attributes:
-        robot: id of the robot.
-        target: id of the goal or station.
-        kind: "goal" or "station".
-        time_s: simulated time of the first tick inside the region.
-        energy_J: measured battery content on arrival, before any recharge.
-    """
-
-    robot: str
-    target: str
-    kind: str
-    time_s: float
-    energy_J: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +100,7 @@ class EnergyAudit:
     mission_ok: bool
     reasons: tuple[str, ...]
     robots: tuple[RobotAudit, ...]
-    visits: tuple[SimulatedVisit, ...]
+    visits: tuple[Visit, ...]
     goals_visited: tuple[str, ...]
     planned: EnergyLedger
     metered: EnergyLedger
@@ -126,7 +108,7 @@ class EnergyAudit:
     causes: tuple[str, ...] = ()
 
     @property
-    def recharges(self) -> tuple[SimulatedVisit, ...]:
+    def recharges(self) -> tuple[Visit, ...]:
         """The visits of stations."""
         return tuple(visit for visit in self.visits if visit.kind == "station")
 
@@ -152,6 +134,8 @@ class EnergyAudit:
             content = storage.of_format(path.read_bytes(), AUDIT_FORMAT)
             for name in _LEDGERS:
                 content[name] = {"entries": content[name]}
+            for visit in content["visits"]:
+                visit.setdefault("step", 0)  # 0.1.0 did not write it
             return storage.typed(EnergyAudit, content)
 
 

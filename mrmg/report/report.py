@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import shipped, storage
-from mrmg.energy.audit_record import SimulatedVisit
 from mrmg.energy.battery_curves import shown_curves
 from mrmg.energy.by_terrain import energy_by_terrain, planned_interval_J
 from mrmg.energy.ledger import EnergyLedger
@@ -109,9 +108,9 @@ def _of_plan(record: RunRecord, plan: Plan) -> dict[str, Any]:
 
 def _stops(
     tour: Sequence[str],
-    visits: Sequence[Visit | SimulatedVisit],
+    visits: Sequence[Visit],
     ledger: EnergyLedger,
-) -> list[tuple[Visit | SimulatedVisit | None, float | None]]:
+) -> list[tuple[Visit | None, float | None]]:
     """Return the visit of each stop and the energy of the leg to it [J], if any.
 
     Args:

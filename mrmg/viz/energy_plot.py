@@ -33,7 +33,7 @@ def draw_energy(
     """Draw battery content over time, one panel per robot, to a picture file.
 
     Args:
-        scene: gives capacity and reserve.
+        scene: what both were made for.
         plan: what was predicted.
         log: adds the content by the work of the simulated drives.
         path: picture to write (PNG, SVG or PDF by its suffix).
@@ -59,13 +59,13 @@ def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> No
 
     Args:
         axes: where to draw, over time [s].
-        scene: gives capacity and reserve.
+        scene: what both were made for.
         curves: of the robot: as planned, and as simulated where it was.
     """
-    robot = scene.robot(curves[0].robot)
-    color = style.scene_robot_colors(scene)[robot.id]
-    capacity_kJ = robot.battery.capacity_J / 1000.0
-    reserve_kJ = robot.battery.reserve_J / 1000.0
+    robot, battery = curves[-1].robot, curves[-1].battery
+    color = style.scene_robot_colors(scene)[robot]
+    capacity_kJ = battery.capacity_J / 1000.0
+    reserve_kJ = battery.reserve_J / 1000.0
     looks = {"planned": style.PLANNED, "simulated": style.DRIVEN}
     for curve, (label, look) in zip(curves, looks.items(), strict=False):
         stroke = look.stroke(scene_drawing.LETTER_POINTS) | {"solid_joinstyle": "round"}
@@ -78,11 +78,11 @@ def draw_battery(axes: Axes, scene: Scene, curves: Sequence[BatteryCurve]) -> No
     axes.set_xlim(0.0, max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in curves)))
     room = _mark_visits(axes, scene, curves[-1].visits)
     least_J = min(curve.least_J for curve in curves)
-    low = min(0.0, 1.05 * least_J / robot.battery.capacity_J)
+    low = min(0.0, 1.05 * least_J / battery.capacity_J)
     high = low + (_FULL_SHARE - low) / (1.0 - room)
     axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
     axes.set_ylabel("battery [kJ]")
-    axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
+    axes.set_title(robot, loc="left", fontsize=11, fontweight="bold", color=color)
     figures.tidy(axes)
     percent = axes.twinx()
     percent.set_ylim(100.0 * low, 100.0 * high)

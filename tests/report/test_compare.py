@@ -191,7 +191,7 @@ def test_fewer_than_two_runs_are_refused(quickstart_run: Path, tmp_path: Path) -
     for folders in ([quickstart_run], [quickstart_run, quickstart_run]):
         with pytest.raises(UsageError, match="at least two"):
             compare_runs(folders)
-    with pytest.raises(RunFolderError, match="planning.json"):
+    with pytest.raises(RunFolderError, match="run.json"):
         compare_runs([quickstart_run, tmp_path])
 
 
