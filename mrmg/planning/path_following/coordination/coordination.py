@@ -17,7 +17,7 @@ at in the reverse order, and make coarser motions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -136,8 +136,6 @@ class _Planning:
         )
         self.round, self.fineness = ROUNDS[0], 1.0
         self.nodes, self.most, self.horizon = 0, np.inf, horizon
-        self._blocked: set[int] = set()
-        """Robots whose short search has failed: the next ones are long."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
@@ -160,7 +158,7 @@ class _Planning:
         if self.nodes >= self.most:
             return None
         self.nodes += 1
-        options = self.round, self.fineness, yielding, since, r in self._blocked
+        options = self.round, self.fineness, yielding, since
         asked = (r, *options, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
             begun = motions[r] or self._unmoved[r]
@@ -181,65 +179,61 @@ class _Planning:
         above: np.ndarray,
         yielding: bool,
     ) -> Motion | None:
-        traffic = self._traffic.around(r, motions, above)
-        hard = traffic.robot["hard"]
-        fields = self._fields.in_time(r, self._tours[r], traffic)
-        if hard.any() and not fields.are_timed(r, self._tours[r], traffic):
-            # Those that it must not meet may stand long before all others do.
-            traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
-        for task, course in self._tasks(r, traffic, yielding):
-            found = self._search(r, task, traffic, course)
-            if found is not None:
-                return found
-            self._blocked.add(r)
-        return None
-
-    def _tasks(
-        self, r: int, traffic: Traffic, yielding: bool
-    ) -> Iterator[tuple[Task, Course]]:
-        """Yield what to search for, and along which path.
-
-        If there is room for costs-to-go that know when the others are where, a short
-        search without them comes first; the one with them does without the path: robots
-        that turn on the spot have the way down the costs-to-go instead. A robot that
-        has driven along a path to several targets keeps to it.
-        """
-        problem, path, tour = self._problem, self._paths[r], self._tours[r]
-        course, fields = self._courses[r], self._fields
         now = replace(self.round, fineness=self.fineness * self.round.fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
+        tour, traffic = self._tours[r], self._traffic.around(r, motions, above)
+        hard = traffic.robot["hard"]
+        fields = self._fields.in_time(r, tour, traffic)
+        known = fields.are_timed(r, tour, traffic)
+        if hard.any() and not known:
+            # Those that it must not meet may stand long before all others do.
+            traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
         follows = self._follows[r]
-        task = task_of(problem, r, tour, path, now, driven=follows)
+        task = task_of(self._problem, r, tour, self._paths[r], now, driven=follows)
         task = task._replace(enough=FIRST_MOST)
+        if known and not (follows and len(tour) > 1):
+            return self._search(r, traffic, *self._in_time(r, task, now, traffic))
+        share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
+        task = task._replace(most=min(share * now.most, LONGEST))
+        return self._search(
+            r, traffic, self._along_path(r, task, now), self._courses[r]
+        )
+
+    def _in_time(
+        self, r: int, task: Task, now: Round, traffic: Traffic
+    ) -> tuple[Task, Course]:
+        """Return a task with costs-to-go that know when the others are where.
+
+        It does without the path. Robots that turn on the spot have the way down the
+        costs-to-go instead.
+        """
+        problem, tour = self._problem, self._tours[r]
+        fields = self._fields.in_time(r, tour, traffic)
+        nowhere = no_path(problem, r)
+        free = task_of(problem, r, tour, nowhere, now)._replace(
+            stay=task.stay, later_s=task.later_s
+        )
+        costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
+        guide, way = fields.timed(r, tour, task.stay, traffic, costs)
+        turning = fields.turning(r, tour) if now.turning else UNKNOWN
+        lead = leads.rounded_path(problem, r, way)
+        guide = guide._replace(turning=turning)
+        return guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
+
+    def _along_path(self, r: int, task: Task, now: Round) -> Task:
+        """Return a task with costs-to-go along the path, or among obstacles alone."""
+        problem, path, tour = self._problem, self._paths[r], self._tours[r]
         led = len(path.target) == len(tour) or is_one_pose(problem, r, tour)
         led &= bool(np.isfinite(task.along).all())
         guide = NO_GUIDE
         if not (led and now.most == ROUNDS[0].most):
-            turning = fields.turning(r, tour) if now.turning else UNKNOWN
-            guide = fields.static(r, tour)._replace(turning=turning)
-        along = guided(problem, r, task, path, guide)
-        fields = fields.in_time(r, tour, traffic)
-        known = fields.are_timed(r, tour, traffic) and not (follows and len(tour) > 1)
-        if known and not (yielding or r in self._blocked):
-            yield along._replace(most=min(FIRST_MOST, now.most)), course
-        if not known:
-            share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
-            yield along._replace(most=min(share * along.most, LONGEST)), course
-        else:
-            nowhere = no_path(problem, r)
-            free = task_of(problem, r, tour, nowhere, now)._replace(
-                stay=task.stay, later_s=task.later_s
-            )
-            costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
-            guide, way = fields.timed(r, tour, task.stay, traffic, costs)
-            turning = fields.turning(r, tour) if now.turning else UNKNOWN
-            guide = guide._replace(turning=turning)
-            lead = leads.rounded_path(problem, r, way)
-            yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
+            turning = self._fields.turning(r, tour) if now.turning else UNKNOWN
+            guide = self._fields.static(r, tour)._replace(turning=turning)
+        return guided(problem, r, task, path, guide)
 
     def _search(
-        self, r: int, task: Task, traffic: Traffic, course: Course
+        self, r: int, traffic: Traffic, task: Task, course: Course
     ) -> Motion | None:
         mission = self._problem.mission
         search = Setting(

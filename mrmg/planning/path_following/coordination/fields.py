@@ -40,14 +40,6 @@ FEW_TIMED_CELLS, COARSEST_SHARE = 300_000, 0.3
 """Cells of such fields beyond which each four cells are joined, where they are finer
 than usual, and the longest side of what becomes of them, in radii of the robot."""
 
-LATE_S = 1.5
-"""How much later, or sooner, than costs-to-go tell a robot may be somewhere: they know
-neither how it turns nor how it gains speed [s]."""
-
-NEAR_MISS_SHARE = 3.0
-"""Cost of a second where another robot is so much later or sooner, over that of driving
-for it."""
-
 UNKNOWN = np.zeros((0, 1, 1, 1))
 """What turning costs where that is not known."""
 
@@ -143,7 +135,6 @@ class Fields:
         _field_kernels.add_others(
             own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
         )
-        _add_near_misses(penalty, layer_s)
         standing, stood = hold_share * layer_s, np.full(len(targets), -1)
         stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
@@ -319,23 +310,3 @@ class Fields:
         for t in targets:
             _field_kernels.add_region(places, t, *self._grid, region)
         return region
-
-
-def _add_near_misses(penalty: np.ndarray, layer_s: float) -> None:
-    """Add the cost of being where another robot is a little later, or was before.
-
-    Else a search that is led by a gap in traffic which its robot just misses looks at
-    all ways to get there in time, before it lets the others pass.
-
-    Args:
-        penalty: of cells, inf where other robots are, shape (T, ny, nx).
-        layer_s: time of a layer [s].
-    """
-    ever = np.isinf(penalty).any(axis=0)
-    taken = np.isinf(penalty[:, ever])
-    late, layer = round(LATE_S / layer_s), np.arange(len(taken))
-    before = np.zeros((len(taken) + 1, taken.shape[1]), np.int32)
-    np.cumsum(taken, axis=0, out=before[1:])
-    last, first = np.minimum(layer + late + 1, len(taken)), np.maximum(layer - late, 0)
-    near = (before[last] > before[first]) & ~taken
-    penalty[:, ever] += np.where(near, NEAR_MISS_SHARE * layer_s, 0.0)
