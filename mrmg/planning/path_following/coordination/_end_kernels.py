@@ -18,7 +18,6 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     clear,
     drivable_radius,
     drive_curve,
-    smooth_radius,
     write_curve,
 )
 from mrmg.planning.problem._clearance_kernels import keeps_clear
@@ -129,8 +128,7 @@ def free_pose(search, target, corner):
 def drive_to(search, target, room, control):
     """Write a drive to a target without regard to others; return the steps, or -1.
 
-    A car drives along the shortest curve. A robot that turns on the spot drives
-    straight and turns, or along a curve where it is there sooner.
+    A car drives along the shortest curve, a robot that turns on the spot straight.
     """
     own, targets = search.own, search.targets
     course, state = room.curve, room.state
@@ -139,32 +137,17 @@ def drive_to(search, target, room, control):
     x, y, heading = free_pose(search, target, room.corner[0])
     free = targets.target[target].tolerance >= pi
     tolerance = np.inf if free else targets.target[target].tolerance
+    radius = 0.0
     if own[0].model == CAR:
+        radius = drivable_radius(own[0])
         if free:
             heading = np.arctan2(y - state[0, 1], x - state[0, 0])
             if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
                 heading = wrap(heading + pi)
-        radius = drivable_radius(own[0])
-        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
-        if not total < np.inf:
-            return -1
-        return drive_curve(search, course, state, control)
-    curved = -1
-    if not free:
-        radius = smooth_radius(own[0])
-        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
-        if total < np.inf:
-            curved = drive_curve(search, course, state, control)
-        if curved >= 0 and not at_target(targets, target, state[curved]):
-            curved = -1
-    total = write_curve(own, state[0], x, y, heading, tolerance, course, 0.0)
+    total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
     if not total < np.inf:
         return -1
-    count = drive_curve(search, course, state, control)
-    if curved >= 0 and (count < 0 or curved < count):
-        write_curve(own, state[0], x, y, heading, tolerance, course, radius)
-        count = drive_curve(search, course, state, control)
-    return count
+    return drive_curve(search, course, state, control)
 
 
 @inlined

@@ -6,7 +6,7 @@ model, so that what is found can be driven exactly.
 
 from __future__ import annotations
 
-from math import atan, cos, hypot, sin, sqrt
+from math import atan, cos, hypot, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -27,10 +27,10 @@ from mrmg.planning.problem._control_kernels import (
 )
 from mrmg.planning.problem._region_kernels import in_region
 
-BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
-"""Brake, or drive home, and be through; drive to a target's pose; stand in a target, or
-until others set out; follow the path; brake, and stand; hold a speed and a steering,
-numbered from MOVE on."""
+BRAKE, HOME, VISIT, STAY, TRACK, HOLD, MOVE = range(-4, 3)
+"""Brake, or drive home, and be through; drive to a target's pose; stand in a target;
+follow the path; brake, and stand; hold a speed and a steering, numbered from MOVE on.
+"""
 
 WAYPOINTS = 8
 """Motions of a custom motion model that steer to points; the others hold controls."""
@@ -69,8 +69,6 @@ class Traffic(NamedTuple):
         robot: `OTHER`, shape (R,).
         busy: whether a robot that must not be met is in a mutual-exclusion zone, shape
             (G, K).
-        busy_left: in how many of the steps from one on it is, shape (G, K).
-        release: steps at which such a robot sets out or leaves a zone, sorted.
         end: step from which on all of them stand.
     """
 
@@ -79,8 +77,6 @@ class Traffic(NamedTuple):
     middle: np.ndarray
     robot: np.ndarray
     busy: np.ndarray
-    busy_left: np.ndarray
-    release: np.ndarray
     end: int
 
 
@@ -190,17 +186,6 @@ def drivable_radius(robot):
             break
         radius *= 1.1
     return radius
-
-
-@kernel
-def smooth_radius(robot):
-    """Return the radius of turns that a robot that turns by its wheels hardly leaves.
-
-    While its rate of turning grows it drives the same share of it as a car does.
-    """
-    top = robot.limit[1]
-    least = top / sqrt(SETTLING_SHARE * robot.limit[4])
-    return max(least, top / robot.limit[2])
 
 
 @kernel

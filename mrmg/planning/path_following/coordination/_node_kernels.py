@@ -271,22 +271,6 @@ def along_path_s(search, leg, left, state):
     return rest_s + way / search.own[0].limit[1] + task.rest_s
 
 
-@kernel
-def queueing_s(search, leg, step_number):
-    """Return the cost of waiting until the zone of the next target is free [s].
-
-    Without it waits of minutes would be put off until all that takes less is tried.
-    """
-    task = search.task
-    if leg == len(task.leg):
-        return 0.0
-    zone = search.targets.target[task.leg[leg]].zone
-    if zone < 0:
-        return 0.0
-    left = search.traffic.busy_left[zone]
-    return task.hold_share * search.dt * left[min(step_number, len(left) - 1)]
-
-
 @inlined
 def add(search, nodes, a, motion, state, place, cost):
     """Add a node and open it, if its cost-to-go is finite; return it or -1.
@@ -313,7 +297,7 @@ def add(search, nodes, a, motion, state, place, cost):
     node = nodes.node[b]
     node.parent, node.motion, node.step, node.leg = a, motion, step_number, leg
     node.segment, node.left, node.cost = segment, left, cost
-    value = cost + nodes.weight[0] * rest_s + queueing_s(search, leg, step_number)
+    value = cost + nodes.weight[0] * rest_s
     entry = 2 * b + (1 if motion == TRACK else 0)
     nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, entry)
     return b

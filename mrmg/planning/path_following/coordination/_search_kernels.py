@@ -34,7 +34,6 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     STAY,
     TRACK,
     VISIT,
-    WAIT,
     clear,
     move,
 )
@@ -58,8 +57,8 @@ from mrmg.world._kernels import multiplier_in
 REJOIN_M, REJOIN_ANGLE = 0.4, 0.4
 """Distance [m] and deviation [rad] within which a robot takes to its path again."""
 
-WAYS_ON = 6
-"""Ways on from a node beside its motions: to track, hold, wait, stay, visit, end."""
+WAYS_ON = 5
+"""Ways on from a node beside its motions: to track, hold, stay, visit, end."""
 
 WIDENING_SHARE = 0.25
 """How much later than the motion along the path the others are looked at, as a share
@@ -169,38 +168,26 @@ def expand(search, nodes, room, a, begin, end):
 
 
 @kernel
-def stand(search, nodes, room, a, motion, tail, last):
-    """Add a node that stands, after braking for `tail` steps, until step `last`.
-
-    Args:
-        search, nodes, room: the search.
-        a: the node before it.
-        motion: STAY, which ends the leg, or WAIT.
-        tail, last: steps from node a on.
-    """
-    task, first = search.task, nodes.node[a].step
-    stop = braking_steps(search.own, search.dt)
-    if first + last + stop >= len(room.control):
+def stay(search, nodes, room, a):
+    """Open a stay in the leg's target, if braking from node a ends in it."""
+    task, targets, before = search.task, search.targets, nodes.node[a]
+    tail = brake(search.own, search.dt, room.state, room.control)
+    last = tail + task.stay[before.leg]
+    stop, end = braking_steps(search.own, search.dt), before.step + last
+    if end + stop >= len(room.control):
+        return
+    if not at_target(targets, task.leg[before.leg], room.state[tail]):
         return
     for k in range(tail, last):
         copy_numbers(room.state[k], room.state[k + 1])
-    leg = nodes.node[a].leg + (1 if motion == STAY else 0)
-    if not is_new(nodes.table, cell_of(task, room.state[last], leg, first + last)):
+    leg = before.leg + 1
+    if not is_new(nodes.table, cell_of(task, room.state[last], leg, end)):
         return
-    conflict_s = passing_cost(search, room, last, first)
+    conflict_s = passing_cost(search, room, last, before.step)
     if conflict_s < np.inf:
-        cost = nodes.node[a].cost + task.hold_share * last * search.dt + conflict_s
-        place = (first + last, leg, nodes.node[a].segment, nodes.node[a].left)
-        add(search, nodes, a, motion, room.state[last], place, cost)
-
-
-@kernel
-def stay(search, nodes, room, a):
-    """Open a stay in the leg's target, if braking from node a ends in it."""
-    task, targets, leg = search.task, search.targets, nodes.node[a].leg
-    tail = brake(search.own, search.dt, room.state, room.control)
-    if at_target(targets, task.leg[leg], room.state[tail]):
-        stand(search, nodes, room, a, STAY, tail, tail + task.stay[leg])
+        cost = before.cost + task.hold_share * last * search.dt + conflict_s
+        place = (end, leg, before.segment, before.left)
+        add(search, nodes, a, STAY, room.state[last], place, cost)
 
 
 @kernel
@@ -226,16 +213,6 @@ def visit(search, nodes, room, a):
 
 
 @kernel
-def wait(search, nodes, room, a):
-    """Open a wait until a robot that must not be met sets out, or leaves a zone."""
-    tail = brake(search.own, search.dt, room.state, room.control)
-    release = search.traffic.release
-    i = np.searchsorted(release, nodes.node[a].step + tail, side="right")
-    if i < len(release):
-        stand(search, nodes, room, a, WAIT, tail, release[i] - nodes.node[a].step)
-
-
-@kernel
 def write_controls(search, nodes, room, a, control):
     """Write the controls that lead to end a; return their number."""
     branch = np.empty(nodes.size[0], np.int64)
@@ -254,7 +231,7 @@ def write_controls(search, nodes, room, a, control):
             target = search.task.leg[before.leg]
             drive_to(search, target, room, control[first:])
             continue
-        held = HOLD if motion in (STAY, WAIT) else motion
+        held = HOLD if motion == STAY else motion
         move(search, held, before.segment, steps, room.state, control[first:])
     p = nodes.node[a].parent
     first = nodes.node[p].step
@@ -339,7 +316,6 @@ def find_motion(search, nodes, room, begun, control):
                 )
                 continue
         copy_numbers(nodes.state[a], room.state[0])
-        wait(search, nodes, room, a)
         expand(search, nodes, room, a, HOLD, MOVE + motions)
         if nodes.size[2] >= 0:
             most = min(most, max(task.enough, int(AFTER_END * nodes.size[0])))

@@ -16,10 +16,6 @@ CLOSING_SHARE = 1.5
 """How much faster than the reference point at most the middle of a footprint moves."""
 
 
-STANDING_STEPS = 20
-"""Steps after which a robot that stands is worth waiting for."""
-
-
 class FleetTraffic:
     """The motions of all robots; only those that change are copied."""
 
@@ -38,7 +34,6 @@ class FleetTraffic:
         self._problem = problem
         self._closing = (speed[:, None] + speed) * problem.dt_s
         self._noted: list[Motion | None] = [None] * robots
-        self._starts = [np.zeros(0, np.int64)] * robots
         self._inside = np.zeros((robots, zones, horizon), bool)
         self._traffic = Traffic(
             fleet=mission.fleet,
@@ -46,8 +41,6 @@ class FleetTraffic:
             middle=np.zeros((robots, horizon + 1, 2)),
             robot=np.zeros(robots, OTHER),
             busy=np.zeros((zones, horizon), bool),
-            busy_left=np.zeros((zones, horizon), np.int64),
-            release=np.zeros(0, np.int64),
             end=0,
         )
 
@@ -61,7 +54,6 @@ class FleetTraffic:
             _conflict_kernels.note_motion(
                 mission.fleet, mission.zones, self._traffic, self._inside, r, count
             )
-            self._starts[r] = starts_of(motion)
             self._noted[r] = motion
 
     def around(
@@ -73,17 +65,12 @@ class FleetTraffic:
         known[r] = False
         hard = above & known
         lasting = self._traffic.robot["last"][known]
-        busy = self._inside[hard].any(axis=0)
-        free = np.flatnonzero((busy[:, :-1] & ~busy[:, 1:]).any(axis=0)) + 1
-        starts = [self._starts[other] for other in np.flatnonzero(hard)]
         robot = self._traffic.robot.copy()
         robot["closing"] = self._closing[r]
         robot["hard"], robot["soft"] = hard, known & ~hard
         return self._traffic._replace(
             robot=robot,
-            busy=busy,
-            busy_left=np.ascontiguousarray(busy[:, ::-1].cumsum(axis=1)[:, ::-1]),
-            release=np.unique(np.concatenate([*starts, free])),
+            busy=self._inside[hard].any(axis=0),
             end=int(lasting.max()) if len(lasting) else 0,
         )
 
@@ -95,13 +82,6 @@ class FleetTraffic:
         conflict = np.full(len(fleet), np.inf)
         _conflict_kernels.conflicts_of(fleet, self._traffic, self._inside, r, conflict)
         return conflict
-
-
-def starts_of(motion: Motion) -> np.ndarray:
-    """Return the steps at which a robot sets out after it has stood for a while."""
-    moves = np.append((np.diff(motion.state[:, :3], axis=0) != 0.0).any(axis=1), True)
-    ways = np.flatnonzero(moves)
-    return ways[np.diff(ways, prepend=-1) > STANDING_STEPS]
 
 
 def trajectories_of(

@@ -64,8 +64,6 @@ def traffic_of(problem: Problem, states: np.ndarray, *, hard: bool = True) -> Tr
             OTHER,
         ),
         busy=np.zeros((1, len(states)), bool),
-        busy_left=np.zeros((1, len(states)), np.int64),
-        release=np.zeros(0, np.int64),
         end=len(states) - 1,
     )
 
