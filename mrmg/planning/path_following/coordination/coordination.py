@@ -1,18 +1,13 @@
 """Motions of a whole fleet along its tours, found robot by robot.
 
 Each robot's motion is found by a search over its own motions (`_search_kernels`), and
-who has priority over whom by a search over the orders of robots (`priorities`). Where
-that finds none, an order in which robots drive one after the other is looked for
-(`sequencing`), from the second round on with other motions than they would make alone,
-too: in dense traffic there often is one, though with longer motions. All that is found
-can be driven exactly, and keeps clear at every step.
+who has priority over whom by a search over the orders of robots (`priorities`). All
+that is found can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots that may matter has one, with cells as fine and
 searches as long as the round allows, or when it has looked at as many nodes as it may.
-Rounds are finer and longer, then they begin anew with other motions. Where several
-robots have driven no path, a round is in two halves: in the second one they are looked
-at in the reverse order, and make coarser motions.
+Rounds are finer and longer, then they begin anew with other motions.
 """
 
 from __future__ import annotations
@@ -37,7 +32,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, Rollouts
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.rounds import (
-    COARSER,
     FIRST_MOST,
     LONGEST,
     ROUNDS,
@@ -49,7 +43,6 @@ from mrmg.planning.path_following.coordination.rounds import (
     YIELDING_WEIGHT,
     Round,
 )
-from mrmg.planning.path_following.coordination.sequencing import in_sequence
 from mrmg.planning.path_following.coordination.tasks import (
     guided,
     horizon_steps,
@@ -134,8 +127,7 @@ class _Planning:
                 stiffness=1.0,
             ),
         )
-        self.round, self.fineness = ROUNDS[0], 1.0
-        self.nodes, self.most, self.horizon = 0, np.inf, horizon
+        self.round, self.nodes, self.most = ROUNDS[0], 0, np.inf
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
@@ -158,8 +150,7 @@ class _Planning:
         if self.nodes >= self.most:
             return None
         self.nodes += 1
-        options = self.round, self.fineness, yielding, since
-        asked = (r, *options, above.tobytes(), *map(id, motions))
+        asked = (r, self.round, yielding, since, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
             begun = motions[r] or self._unmoved[r]
             self._begun = begun.state[: since + 1]
@@ -179,7 +170,7 @@ class _Planning:
         above: np.ndarray,
         yielding: bool,
     ) -> Motion | None:
-        now = replace(self.round, fineness=self.fineness * self.round.fineness)
+        now = self.round
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         tour, traffic = self._tours[r], self._traffic.around(r, motions, above)
@@ -312,7 +303,7 @@ def coordinated(
         tours: targets of each robot; a finish comes last.
         paths: of each robot, with its stays; empty ones where there are none.
         halt: shape (1,); the search ends soon after it has turned true.
-        seed: of the orders in which robots are looked at, and of coarser motions.
+        seed: of the orders in which robots are looked at.
         rounds: that are made one after the other.
         drives: along their paths, of robots that have driven them alone.
     """
@@ -323,20 +314,14 @@ def coordinated(
     planning = _Planning(problem, tours, paths, drives, horizon)
     rng = seeding.stream(seed, "coordination")
     for now in rounds:
-        drawn = rng.permutation(robots).tolist()
-        orders = [drawn, drawn[::-1]] if drives.count(None) > 1 else [drawn]
-        for order in orders:
-            planning.fineness = 1.0 if order is drawn else rng.uniform(*COARSER)
-            alone = planning.find_alone(order, drives, now, halt)
-            if alone is None:
-                return ()
-            most = SEARCHES * now.most * robots / len(orders)
-            found = priorities.search_priorities(alone, planning, most, halt)
-            if found is None:
-                further = now.most > ROUNDS[0].most and order is drawn
-                found = in_sequence(alone, planning, most if further else 0, halt)
-            if found is not None:
-                planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
-                found = priorities.shortened(found, alone, planning, halt)
-                return trajectories_of(problem, found)
+        order = rng.permutation(robots).tolist()
+        alone = planning.find_alone(order, drives, now, halt)
+        if alone is None:
+            return ()
+        most = SEARCHES * now.most * robots
+        found = priorities.search_priorities(alone, planning, most, halt)
+        if found is not None:
+            planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
+            found = priorities.shortened(found, alone, planning, halt)
+            return trajectories_of(problem, found)
     return ()

@@ -4,11 +4,8 @@ H. Ma, D. Harabor, P. J. Stuckey, J. Li, S. Koenig: Searching with consistent
 prioritization for multi-agent path finding, AAAI 2019. Each node is a partial order of
 the robots and a motion for each of them that has no conflict with higher ones. Where
 two motions conflict, one child gives one robot priority and the other child the other
-one. The search goes depth first and back, so that it looks at every order that may
-matter. Where a robot has no motion it goes back to the last order of two robots that
-are in question there (conflict-directed backjumping: P. Prosser, Hybrid algorithms for
-the constraint satisfaction problem, Computational Intelligence 9, 1993). Orders of
-other robots are left out then: they matter only as far as robots make room for them.
+one. The search goes depth first
+and back, so that it looks at every order that may matter.
 """
 
 from __future__ import annotations
@@ -29,9 +26,6 @@ any case."""
 SINCE_SHARES = 0.0, 0.5
 """Shares of a motion after which it is looked for anew, one after the other."""
 
-YIELDS = 2
-"""Times that each of two robots makes room for the other one."""
-
 
 class MotionPlanning(Protocol):
     """What the search needs to know of motions.
@@ -39,12 +33,10 @@ class MotionPlanning(Protocol):
     Attributes:
         nodes: that have been looked at for all motions so far.
         most: nodes after which no motion is found any more.
-        horizon: steps that motions last at most.
     """
 
     nodes: int
     most: float
-    horizon: int
 
     def kept(self, r: int, motion: Motion) -> Motion:
         """Return a motion of robot r that is kept; equal ones are one object."""
@@ -113,48 +105,18 @@ def search_priorities(
     if not np.isfinite(conflict).any():
         return tuple(motions)
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
-    stack = [_Frame.of(root, planning)]
-    seen: dict[tuple[object, ...], np.ndarray] = {}  # two may make room in turn
+    stack, seen = [_children(root, planning)], set()  # two may make room in turn
     planning.most = planning.nodes + most
     while stack and planning.nodes < planning.most and not halt[0]:
-        frame = stack[-1]
-        child = next(frame.children, None)
+        child = next(stack[-1], None)
         if child is None:
-            blamed = stack.pop().blamed
-            while stack and not blamed[stack[-1].pair].all():
-                stack.pop().blamed[:] = blamed
-            if stack:
-                stack[-1].blamed[blamed] = True
+            stack.pop()
         elif not np.isfinite(child.conflict).any():
             return child.motions
-        elif child.key in seen:
-            frame.blamed[seen[child.key]] = True
-        else:
-            stack.append(_Frame.of(child, planning))
-            seen[child.key] = stack[-1].blamed
+        elif child.key not in seen:
+            seen.add(child.key)
+            stack.append(_children(child, planning))
     return None
-
-
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """A node that is being looked at.
-
-    Attributes:
-        pair: two robots in conflict, one of which has priority in each child.
-        children: that are left.
-        blamed: robots whose orders have a part in all failures so far, shape (R,).
-    """
-
-    pair: list[int]
-    children: Iterator[_Node]
-    blamed: np.ndarray
-
-    @staticmethod
-    def of(node: _Node, planning: MotionPlanning) -> _Frame:
-        """Return a node whose children are all left."""
-        pair, blamed = _pair(node), np.zeros(len(node.motions), bool)
-        blamed[pair] = True
-        return _Frame(pair, _children(node, pair, planning, blamed), blamed)
 
 
 def _pair(node: _Node) -> list[int]:
@@ -172,21 +134,17 @@ def _pair(node: _Node) -> list[int]:
     return sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
 
 
-def _children(
-    node: _Node, pair: list[int], planning: MotionPlanning, blamed: np.ndarray
-) -> Iterator[_Node]:
+def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
     """Yield the nodes in which one of two robots in conflict has priority.
 
     The second one is given priority first; the other order is looked at only where that
-    leaves as many conflicts, or leads nowhere. `blamed` receives the robots in question
-    where there is no motion.
+    leaves as many conflicts, or leads nowhere.
     """
-    found = []
+    found, pair = [], _pair(node)
     for one, other in (pair, pair[::-1]):
         if node.above[other, one]:
-            blamed[node.above[other]] = True
             continue
-        child = _with_priority(node, one, other, planning, blamed)
+        child = _with_priority(node, one, other, planning)
         if child is not None and child.cost < node.cost:
             yield child
         elif child is not None:
@@ -195,12 +153,9 @@ def _children(
 
 
 def _with_priority(
-    node: _Node, low: int, high: int, planning: MotionPlanning, blamed: np.ndarray
+    node: _Node, low: int, high: int, planning: MotionPlanning
 ) -> _Node | None:
-    """Return the node in which one more robot has priority over another one.
-
-    None where a robot has no motion: `blamed` receives those above it, and itself.
-    """
+    """Return the node in which one more robot has priority, None without a motion."""
     above = node.above.copy()
     upper = np.append(np.flatnonzero(above[high]), high)
     lower = np.append(np.flatnonzero(above[:, low]), low)
@@ -214,7 +169,6 @@ def _with_priority(
             found = _giving_way(low, high, above, motions, planning)
             conflict[high] = conflict[:, high] = planning.conflicts(high, motions)
         if found is None:
-            blamed[above[r]] = blamed[r] = True
             return None
         motions[r] = found
         conflict[r] = conflict[:, r] = planning.conflicts(r, motions)
@@ -230,16 +184,13 @@ def _giving_way(
 ) -> Motion | None:
     """Return a motion of a robot that passes another one where both make room.
 
-    In turn one of them makes as much room for the other one as it can, until the other
-    one gets past; `motions` receives that of the other one.
+    Each of them makes as much room for the other one as it can, until the other one
+    gets past; `motions` receives that of the other one.
     """
     trial = list(motions)
     beside = above[low].copy()
     beside[high] = False
-    for one, other, blocked in YIELDS * (
-        (high, low, above[high]),
-        (low, high, beside),
-    ):
+    for one, other, blocked in ((high, low, above[high]), (low, high, beside)):
         aside = planning.find(one, trial, blocked, yielding=True)
         if aside is None:
             return None

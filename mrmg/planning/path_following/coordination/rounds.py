@@ -39,8 +39,8 @@ unicycles that meet on open ground (swap2) go the longer way round.
 """
 
 COARSER = 0.7, 0.9
-"""Range of the fineness in a round's second half, over that in the first one: with the
-same motions in both, and in all attempts, 5 of 60 alcoves had no plan at all."""
+"""Range of the fineness of rounds that begin anew, over that in the first ones: with
+the same motions in all attempts, 5 of 60 alcoves had no plan at all."""
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """Step through that range from one time that rounds begin anew to the next: a multiple

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from mrmg.planning.path_following.coordination.coordination import (
     coordinated,
     empty_nodes,
 )
-from mrmg.planning.path_following.coordination.rounds import ROUNDS, SEARCHES
+from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import no_path, task_of
 from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem._target_kernels import at_target
@@ -81,60 +80,6 @@ def test_a_robot_sets_out_by_shorter_motions_where_there_is_no_room_for_longer_o
     plan = mrmg.plan(scene).plan
     assert plan is not None
     assert mrmg.verify(scene, plan).ok
-
-
-def test_both_halves_of_a_round_begin_with_other_robots(
-    yard: Callable[..., Scene],
-    state: Callable[..., Problem],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    orders: list[Sequence[int]] = []
-    find_alone = coordination._Planning.find_alone
-
-    def noted(planning: coordination._Planning, order: Sequence[int], *of: Any) -> Any:
-        orders.append(order)
-        return find_alone(planning, order, *of)
-
-    def nothing(
-        _motions: Sequence[Motion], _planning: Any, most: float, _: Any
-    ) -> None:
-        shares.append(most / (SEARCHES * ROUNDS[0].most * 2))
-
-    shares: list[float] = []
-    monkeypatch.setattr(coordination._Planning, "find_alone", noted)
-    monkeypatch.setattr(coordination.priorities, "search_priorities", nothing)
-    monkeypatch.setattr(coordination, "in_sequence", lambda *_: None)
-    found = coordinated(*_two_robots(yard, state), np.zeros(1, bool), rounds=ROUNDS[:1])
-    assert found == ()
-    assert shares == [0.5, 0.5]
-    assert sorted(map(list, orders)) == [[0, 1], [1, 0]]
-
-
-def test_an_order_of_driving_is_looked_for_only_where_priorities_have_failed(
-    yard: Callable[..., Scene],
-    state: Callable[..., Problem],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Where there is no such order, looking for one takes all nodes of a round.
-
-    The first round, and second halves, have no nodes for it.
-    """
-    tried: list[str] = []
-
-    def priorities_fail(*_: Any) -> None:
-        tried.append("priorities")
-
-    def no_order(_alone: Any, _planning: Any, most: float, _: Any) -> None:
-        tried.append("any order" if most > 0 else "order as they are")
-
-    monkeypatch.setattr(coordination, "in_sequence", no_order)
-    asked = *_two_robots(yard, state), np.zeros(1, bool)
-    assert coordinated(*asked, rounds=ROUNDS[1:2])
-    assert tried == []
-    monkeypatch.setattr(coordination.priorities, "search_priorities", priorities_fail)
-    assert coordinated(*asked, rounds=ROUNDS[:2]) == ()
-    as_they_are = ["priorities", "order as they are"]
-    assert tried == [*as_they_are * 2, "priorities", "any order", *as_they_are]
 
 
 def test_no_motion_is_found_once_a_search_has_taken_its_nodes(

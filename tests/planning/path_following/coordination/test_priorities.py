@@ -97,39 +97,6 @@ def test_none_is_found_where_nobody_can_wait() -> None:
     assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is None
 
 
-class Crossings(Crossing):
-    """Robots that cross one place and others that cross another one."""
-
-    def __init__(self, *groups: tuple[Sequence[int], Sequence[int]]) -> None:
-        super().__init__(*([one for g in groups for one in g[i]] for i in range(2)))
-        group = [number for number, (each, _) in enumerate(groups) for _ in each]
-        self.together = np.equal.outer(group, group)
-
-    def find(
-        self,
-        r: int,
-        motions: Sequence[Motion],
-        above: np.ndarray,
-        *,
-        yielding: bool = False,
-        since: int = 0,
-    ) -> Motion | None:
-        """Return the soonest motion that crosses when nobody above does there."""
-        return super().find(r, motions, above & self.together[r])
-
-    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
-        """Return the step at which robot r crosses with each one at its place."""
-        return np.where(self.together[r], super().conflicts(r, motions), np.inf)
-
-
-def test_orders_that_have_no_part_in_a_failure_are_left_as_they_are() -> None:
-    """Four robots have 24 orders, and two others none, whatever those four do."""
-    places = Crossings(([3, 3, 3, 3], [9, 9, 9, 9]), ([5, 5], [0, 0]))
-    alone = [places.motion(r, 0) for r in range(6)]
-    assert search_priorities(alone, places, 10_000, np.array([False])) is None
-    assert len(places.asked) < 50  # some 500 if all orders of the four are looked at
-
-
 def test_it_is_given_up_after_so_many_nodes() -> None:
     alone = [Crossing([3] * 3, [9] * 3).motion(r, 0) for r in range(3)]
     for most, is_found in ((1, False), (100, True)):
