@@ -58,8 +58,7 @@ class Task(NamedTuple):
         stay: steps to stand in each of them, shape (L,).
         along: way along the path to each of them [m]; inf where it leads to none, (L,).
         rest_s: time from the end of the path on.
-        later_s: cost from each leg on of stays, and of turns from heading to heading
-            beyond the costs-to-go, shape (L + 1,).
+        later_s: cost of stays from each leg on, shape (L + 1,).
         finish: target to end in, or -1.
         home_along: whether the path leads to the finish.
         guide: costs-to-go on each leg.
@@ -72,8 +71,6 @@ class Task(NamedTuple):
         hold_share: cost of a second of standing, of moving it is 1.
         soft_s: cost of a conflict with a robot of lower priority [s].
         most: nodes at most.
-        enough: nodes after which the best end that was found counts, or AFTER_END times
-            as many as finding the first one took.
     """
 
     leg: np.ndarray
@@ -92,7 +89,6 @@ class Task(NamedTuple):
     hold_share: float
     soft_s: float
     most: int
-    enough: int
 
 
 class Setting(NamedTuple):

@@ -21,6 +21,7 @@ from mrmg import seeding
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels, leads, priorities
+from mrmg.planning.path_following.coordination._guide_kernels import guide_at
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import (
     NODE,
@@ -32,7 +33,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, Rollouts
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.rounds import (
-    FIRST_MOST,
     LONGEST,
     ROUNDS,
     ROUNDS_ALONE,
@@ -44,10 +44,8 @@ from mrmg.planning.path_following.coordination.rounds import (
     Round,
 )
 from mrmg.planning.path_following.coordination.tasks import (
-    guided,
     horizon_steps,
     is_one_pose,
-    no_path,
     task_of,
 )
 from mrmg.planning.path_following.coordination.traffic import (
@@ -182,7 +180,6 @@ class _Planning:
             traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
         follows = self._follows[r]
         task = task_of(self._problem, r, tour, self._paths[r], now, driven=follows)
-        task = task._replace(enough=FIRST_MOST)
         if known and not (follows and len(tour) > 1):
             return self._search(r, traffic, *self._in_time(r, task, now, traffic))
         share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
@@ -201,27 +198,28 @@ class _Planning:
         """
         problem, tour = self._problem, self._tours[r]
         fields = self._fields.in_time(r, tour, traffic)
-        nowhere = no_path(problem, r)
-        free = task_of(problem, r, tour, nowhere, now)._replace(
-            stay=task.stay, later_s=task.later_s
-        )
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
         guide, way = fields.timed(r, tour, task.stay, traffic, costs)
         turning = fields.turning(r, tour) if now.turning else UNKNOWN
-        lead = leads.rounded_path(problem, r, way)
-        guide = guide._replace(turning=turning)
-        return guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
+        task = task._replace(
+            along=np.full(len(task.along), np.inf),
+            home_along=False,
+            guide=guide._replace(turning=turning),
+        )
+        return task, course_of(problem, r, leads.rounded_path(problem, r, way))
 
     def _along_path(self, r: int, task: Task, now: Round) -> Task:
         """Return a task with costs-to-go along the path, or among obstacles alone."""
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
         led = len(path.target) == len(tour) or is_one_pose(problem, r, tour)
         led &= bool(np.isfinite(task.along).all())
-        guide = NO_GUIDE
+        guide, rest_s = NO_GUIDE, 0.0
         if not (led and now.most == ROUNDS[0].most):
             turning = self._fields.turning(r, tour) if now.turning else UNKNOWN
             guide = self._fields.static(r, tour)._replace(turning=turning)
-        return guided(problem, r, task, path, guide)
+        if task.finish >= 0 and not task.home_along:
+            rest_s = float(guide_at(guide, len(task.leg), 0, *path.node[-1]))
+        return task._replace(guide=guide, rest_s=rest_s)
 
     def _search(
         self, r: int, traffic: Traffic, task: Task, course: Course

@@ -55,9 +55,6 @@ ROUNDS_ALONE = 2
 """Rounds in which a robot's motion without regard to the others is searched for: one
 more than with regard to them, as all else depends on it."""
 
-FIRST_MOST = 300
-"""Nodes of a robot's first search at most, and of one that has found an end."""
-
 SHORTENING_MOST = 2_000
 """Nodes of a search that is to shorten a motion, at least: where two unicycles change
 places (swap2), the shorter motion takes 1,800."""

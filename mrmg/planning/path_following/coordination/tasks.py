@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise, product
+from itertools import product
 from math import ceil, pi
 
 import numpy as np
 
 from mrmg.energy.model import CONSUMERS_W
-from mrmg.motion._kernels import CAR, USER
+from mrmg.motion._kernels import USER
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination._guide_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._motion_kernels import WAYPOINTS
-from mrmg.planning.path_following.coordination._node_kernels import Task, posing_time_s
+from mrmg.planning.path_following.coordination._node_kernels import Task
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.path_following.coordination.rounds import Round
 from mrmg.planning.problem.problem import Problem
@@ -151,52 +150,7 @@ def task_of(
         hold_share=standing,
         soft_s=effort.soft_s,
         most=effort.most,
-        enough=effort.most,
     )
-
-
-def guided(problem: Problem, r: int, task: Task, path: Path, guide: Guide) -> Task:
-    """Return robot r's task with costs-to-go through its targets."""
-    rest_s, legs = 0.0, len(task.leg)
-    if task.finish >= 0 and not task.home_along:
-        rest_s = guide_at(guide, legs, 0, *path.node[-1])
-    later_s = task.later_s + poses_s(problem, r, task, guide)
-    return task._replace(guide=guide, rest_s=float(rest_s), later_s=later_s)
-
-
-def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
-    """Return what headings cost beyond the costs-to-go, from each leg on [s], (L + 1,).
-
-    That is the time from pose to pose of targets that follow each other, and that to
-    brake and set off at each.
-    """
-    targets = problem.mission.targets
-    own = problem.mission.fleet[r : r + 1]
-    tour = [*task.leg.tolist(), *([task.finish] if task.finish >= 0 else [])]
-    excess_s = np.zeros(len(task.leg) + 1)
-
-    def rest_s(leg: int, target: int) -> float:
-        return float(guide_at(guide, leg, 0, *targets.target["center"][target]))
-
-    stop_s = float(own[0]["limit"][1] / own[0]["limit"][3])
-    for leg, target in enumerate(task.leg):
-        excess_s[: leg + 1] += stop_s * (targets.target["tolerance"][target] < pi)
-    for leg, (one, other) in enumerate(pairwise(tour)):
-        if (
-            len(guide.turning) > 0
-            or (targets.target["tolerance"][[one, other]] >= pi).any()
-        ):
-            continue
-        x, y = targets.target["center"][one]
-        time_s = posing_time_s(
-            own, targets, other, x, y, targets.target["heading"][one]
-        )
-        if own[0]["model"] == CAR:
-            time_s -= rest_s(leg + 1, one)
-            time_s += rest_s(leg + 2, other) if leg + 2 < len(tour) else 0.0
-        if np.isfinite(time_s):
-            excess_s[: leg + 1] += max(0.0, time_s)
-    return excess_s
 
 
 def horizon_steps(

@@ -14,7 +14,7 @@ from mrmg.planning.path_following.coordination._search_kernels import find_motio
 from mrmg.planning.path_following.coordination.coordination import empty_nodes
 from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.coordination.rounds import ROUNDS
-from mrmg.planning.path_following.coordination.tasks import guided, no_path, task_of
+from mrmg.planning.path_following.coordination.tasks import no_path, task_of
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
 from mrmg.planning.path_following.tracking import Motion, course_of, empty_path
 from mrmg.planning.problem.problem import Problem
@@ -36,7 +36,7 @@ def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
         zones=problem.mission.zones,
         course=course_of(problem, r, nowhere),
         traffic=around,
-        task=guided(problem, r, task, nowhere, guide),
+        task=task._replace(guide=guide),
         dt=problem.dt_s,
     )
     room = Scratch(
