@@ -23,7 +23,6 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
-from mrmg.planning.path_following.coordination._rollout_kernels import Rollouts
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._region_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
@@ -137,7 +136,6 @@ class Nodes(NamedTuple):
         key, entry: heap of open nodes; entries are 2 a, and 2 a + 1 for a node of which
             only the way along the path has been looked at.
         table: cells that have been reached.
-        rollouts: of the motions.
         size: number of nodes, of open ones, and the cheapest end or -1, shape (3,).
         weight: of the cost-to-go, shape (1,).
     """
@@ -147,7 +145,6 @@ class Nodes(NamedTuple):
     key: np.ndarray
     entry: np.ndarray
     table: np.ndarray
-    rollouts: Rollouts
     size: np.ndarray
     weight: np.ndarray
 

@@ -14,7 +14,7 @@ from math import atan2, pi, sqrt
 import numpy as np
 
 from mrmg.compilation import borrowed, inlined, kernel
-from mrmg.motion._kernels import USER, copy_numbers
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.path_following._following_kernels import advance
 from mrmg.planning.path_following.coordination._end_kernels import (
     brake,
@@ -44,10 +44,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     grow_greedy,
     is_new,
     place_of,
-)
-from mrmg.planning.path_following.coordination._rollout_kernels import (
-    carry,
-    rolled_out,
 )
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
@@ -100,23 +96,19 @@ def rejoined(course, left, state):
 
 
 @inlined
-def add_motion(search, nodes, room, a, motion, nears, row):
+def add_motion(search, nodes, room, a, motion, nears):
     """Add what a motion leads to from node a if it is free and new; return it or -1.
 
     Args:
         search, nodes, room: the search.
         a, motion: where it begins and what it does.
         nears: robots that may be met.
-        row: of the rollouts that begin like it, or -1.
     """
     task, course, state = search.task, search.course, room.state
     steps = task.steps
     node = nodes.node[a]
-    segment, left, first = node.segment, node.left, node.step
-    if row >= 0:
-        carry(nodes.rollouts.state[row, motion - HOLD], steps, state)
-    else:
-        segment = move(search, motion, segment, steps, state, room.control)
+    left, first = node.left, node.step
+    segment = move(search, motion, node.segment, steps, state, room.control)
     after = state[steps]
     leg = legs_done(search.targets, task, node.leg, state, 1, steps)
     stamp = first + steps if first < search.traffic.end else 0
@@ -153,13 +145,11 @@ def expand(search, nodes, room, a, begin, end):
         The node that the last one leads to, or -1.
     """
     search, nodes, room = borrowed((search, nodes, room))
-    task, node, last, row = search.task, nodes.node[a], -1, -1
+    task, node, last = search.task, nodes.node[a], -1
     copy_numbers(nodes.state[a], room.state[0])
     nears = list_near(search, room, node.step, task.steps)
-    if begin >= HOLD and search.own[0].model != USER:
-        row = rolled_out(search, nodes.rollouts, room.state[0], room.control)
     for motion in range(begin, end):
-        last = add_motion(search, nodes, room, a, motion, nears, row)
+        last = add_motion(search, nodes, room, a, motion, nears)
     return last
 
 

@@ -30,7 +30,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Setting,
     Task,
 )
-from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, Rollouts
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.rounds import (
     LONGEST,
@@ -82,10 +81,6 @@ def empty_nodes(task: Task) -> Nodes:
         key=np.empty(2 * most + 2),
         entry=np.empty(2 * most + 2, np.int64),
         table=np.full(1 << (ways_on * most).bit_length(), -1, np.int64),
-        rollouts=Rollouts(
-            begin=np.full((ROLLED, 2), np.nan),
-            state=np.empty((ROLLED, 1 + len(task.motion), 1 + task.steps, 5)),
-        ),
         size=np.array([0, 0, -1]),
         weight=np.array([task.weight]),
     )
