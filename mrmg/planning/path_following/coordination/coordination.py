@@ -176,7 +176,7 @@ class _Planning:
         follows = self._follows[r]
         task = task_of(self._problem, r, tour, self._paths[r], now, driven=follows)
         if known and not (follows and len(tour) > 1):
-            return self._search(r, traffic, *self._in_time(r, task, now, traffic))
+            return self._search(r, traffic, *self._in_time(r, task, fields, traffic))
         share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
         task = task._replace(most=min(share * now.most, LONGEST))
         return self._search(
@@ -184,7 +184,7 @@ class _Planning:
         )
 
     def _in_time(
-        self, r: int, task: Task, now: Round, traffic: Traffic
+        self, r: int, task: Task, fields: Fields, traffic: Traffic
     ) -> tuple[Task, Course]:
         """Return a task with costs-to-go that know when the others are where.
 
@@ -192,10 +192,9 @@ class _Planning:
         costs-to-go instead.
         """
         problem, tour = self._problem, self._tours[r]
-        fields = self._fields.in_time(r, tour, traffic)
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
         guide, way = fields.timed(r, tour, task.stay, traffic, costs)
-        turning = fields.turning(r, tour) if now.turning else UNKNOWN
+        turning = fields.turning(r, tour) if self.round.turning else UNKNOWN
         task = task._replace(
             along=np.full(len(task.along), np.inf),
             home_along=False,
