@@ -24,8 +24,6 @@ from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
 from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import (
     energy_and_metres,
-    finish_cut_off,
-    goal_cut_off,
     proof_of_infeasibility,
 )
 from mrmg.planning.frame import Frame
@@ -34,12 +32,14 @@ from mrmg.planning.meetings import narrowest_meeting
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.strategy import easiest, path_following
 from mrmg.planning.preference import TIME_MARGIN_S
+from mrmg.planning.problem.little_room import little_room
 from mrmg.planning.problem.openings import passages_missing
 from mrmg.planning.problem.problem import (
     Problem,
     state_mission,
     unjoined,
 )
+from mrmg.planning.room import finish_cut_off, goal_cut_off
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.planning.routing.shortfall import MAX_SHARE, shortfall
 from mrmg.planning.search import Search
@@ -205,6 +205,9 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     places, passages = _unjoined(problem, params, stations=False)
     if places:
         return endings.NO_PATH.format(places=places, passages=passages)
+    crammed = [*little_room(scene, params.margins)]
+    if crammed:
+        return "; ".join(crammed)
     if not search.tours_found:
         return _missing_tours(problem, params, seed)
     if math.isfinite(search.earliest_s):

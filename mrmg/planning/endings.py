@@ -28,6 +28,15 @@ FINISH_CUT_OFF = (
     "the finish of {robot} is unreachable: it is cut off from the start by "
     "obstacles, or ground too steep, with no gap as wide as the robot{gap}"
 )
+NO_ROOM = (
+    "{place} is unreachable: wherever in it {robot} stood{heading}, the body would "
+    "meet an obstacle or leave the map; {remedy} would help"
+)
+LITTLE_ROOM = (
+    "{place} has too little room for {robot}: {depth_m:g} m deep in it, where plans "
+    "lead, the body{heading} is at most {most} m from obstacles, and plans keep at "
+    "least {least} m from them; {remedy} would help"
+)
 FINISH_OUT_OF_ENERGY = (
     "the finish of {robot} is out of energy's reach: even on the shortest path, over "
     "every station that can be reached, its battery would have to hold at least {more}"

@@ -18,19 +18,18 @@ from shapely.geometry import Point, Polygon
 
 from mrmg.errors import Fault, SceneError
 from mrmg.planning.endings import (
-    FINISH_CUT_OFF,
     FINISHES_CROWDED,
     FINISHES_IN_STATION,
-    GOAL_CUT_OFF,
     GOAL_OUT_OF_ENERGY,
     listed,
 )
-from mrmg.planning.free_ground import FreeGround, bottleneck
+from mrmg.planning.free_ground import FreeGround
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import Walls, outer_polygon, shortest_way_m
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
+from mrmg.planning.room import finish_cut_off, goal_cut_off, no_room
 from mrmg.scene.region import Region
-from mrmg.scene.types import Goal, Robot, Scene
+from mrmg.scene.types import Finish, Goal, Robot, Scene
 
 
 def require_robots(scene: Scene) -> None:
@@ -138,51 +137,23 @@ def _reaches(scene: Scene, halt: np.ndarray = NEVER) -> list[_Reach]:
 
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
-    return {
-        goal.id: goal_cut_off(scene, goal)
-        for goal in scene.goals
-        if reaches and not any(reach.is_connected(goal.region) for reach in reaches)
-    }
+    found = {goal.id: _no_way(scene, reaches, goal) for goal in scene.goals}
+    return {goal: why for goal, why in found.items() if why}
 
 
-def goal_cut_off(scene: Scene, goal: Goal) -> str:
-    """Return the sentence on a goal that no robot gets to."""
-    gap = _widest_gap(scene, scene.robots, goal.region)
-    return GOAL_CUT_OFF.format(goal=goal.id, gap=gap)
-
-
-def finish_cut_off(scene: Scene, robot: Robot) -> str:
-    """Return the sentence on a robot that does not get to its finish."""
-    assert robot.finish is not None
-    gap = _widest_gap(scene, [robot], robot.finish.region)
-    return FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
-
-
-def _widest_gap(scene: Scene, robots: Sequence[Robot], region: Region) -> str:
-    """Return in words how wide the widest gap on the way to a region is, and where.
-
-    Args:
-        scene: the mission.
-        robots: that cannot get there; the one that lacks least is named.
-        region: where they are to get.
-    """
-    wanted = outer_polygon(region)
-    kinds = {(robot.model.name, robot.pose): robot for robot in robots}
-    found: list[tuple[float, str]] = []
-    for robot in [*kinds.values()][:MOST_LOOKED_AT]:
-        half_m = robot.model.half_width_m
-        start, ground = Point(*robot.pose[:2]), FreeGround.of(scene, robot)
-        gap = bottleneck(ground, start, wanted, half_m)
-        if gap is not None and gap.width_m < 2.0 * half_m:
-            text = f"the widest one is {gap}, {robot.id} is {2.0 * half_m:.2f} m wide"
-            found.append((2.0 * half_m - gap.width_m, text))
-        elif gap is not None:
-            return ""
-    return f": {min(found)[1]}" if found else ": there is none at all"
-
-
-MOST_LOOKED_AT = 4
-"""Robots for which gaps are measured at most."""
+def _no_way(scene: Scene, reaches: Sequence[_Reach], place: Goal | Finish) -> str:
+    """Return why no robot gets into a place, as far as obstacles go; "" if one may."""
+    why = ""
+    for reach in reaches:
+        if reach.is_connected(place.region):
+            why = no_room(scene, reach.robot, place)
+            if not why:
+                return ""
+    if why or not reaches:
+        return why
+    if isinstance(place, Finish):
+        return finish_cut_off(scene, reaches[0].robot)
+    return goal_cut_off(scene, place)
 
 
 def _out_of_energy(
@@ -221,9 +192,10 @@ def _out_of_reach(short: Mapping[str, str]) -> dict[str, str]:
 def _unreachable_finish(scene: Scene, reaches: Sequence[_Reach]) -> str | None:
     """Return which robot's finish it cannot get to."""
     for reach in reaches:
-        robot = reach.robot
-        if robot.finish and not reach.is_connected(robot.finish.region):
-            return finish_cut_off(scene, robot)
+        finish = reach.robot.finish
+        why = finish and _no_way(scene, [reach], finish)
+        if why:
+            return why
     return None
 
 

@@ -26,6 +26,7 @@ from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
 from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
 from mrmg.planning.preparation import compile_kernels, load_bounds, load_kernels
+from mrmg.planning.problem.little_room import little_room
 from mrmg.planning.problem.problem import Problem, state_mission, tightened
 from mrmg.planning.roadmap.fleet import margins_of, motion_addresses
 from mrmg.planning.routers import Router
@@ -248,6 +249,8 @@ class _Planning:
 
     def _search(self, problem: Problem, proofs: Proofs) -> Search:
         """Return the search among attempts at a problem."""
+        margins = self.params.margins
+        hopeless = cache(lambda: next(little_room(self.scene, margins), None))
 
         def attempt(number: int, halt: np.ndarray) -> Attempt:
             request = replace(self.request, number=number, halt=halt)
@@ -267,24 +270,26 @@ class _Planning:
                 found = self._tried_tightly(found, tight(), request)
                 kept = nearer()
             found = on_the_map(found, problem, self.scene, self.params)
-            margins = STATES_NONE if kept is not self.scene else self.params.margins
-            plans = [with_margins(kept, plan, margins) for plan in found.plans]
+            stated = STATES_NONE if kept is not self.scene else margins
+            plans = [with_margins(kept, plan, stated) for plan in found.plans]
             return replace(found, plans=plans)
 
         @cache
         def nearer() -> Scene:
-            return with_least_spacing(self.scene, self.params.margins)
+            return with_least_spacing(self.scene, margins)
 
         @cache
         def tight() -> Problem | None:
-            margins = self.frame.params(self.params).margins
-            near = with_least_spacing(problem.scene, margins)
+            own = self.frame.params(self.params).margins
+            near = with_least_spacing(problem.scene, own)
             bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
             tighter = tightened(near, self.request.seed, bare)
             # Plans are of the scene as it is.
             return tighter and replace(tighter, scene=problem.scene)
 
         def proof(tours_missing: bool, goes_on: bool) -> str | None:
+            if goes_on and hopeless():
+                return hopeless()
             missing = tours_missing or math.isinf(self.statistics.bounds.energy_J or 0)
             # Where there are tours, next to nothing but finishes can be in the way, and
             # the proofs of a large fleet take longer than its next attempts.

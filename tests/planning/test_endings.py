@@ -41,6 +41,7 @@ STATUSES = {
         "GOAL_CUT_OFF",
         "GOAL_OUT_OF_ENERGY",
         "FINISH_CUT_OFF",
+        "NO_ROOM",
         "FINISH_OUT_OF_ENERGY",
         "FINISHES_CROWDED",
         "FINISHES_IN_STATION",
@@ -63,6 +64,11 @@ def car(name: str, x: float, y: float, yaw: float = 0.0, **more: Any) -> dict[st
 
 def ends_at(x: float, y: float, radius: float = 0.5) -> dict[str, Any]:
     return {"circle": {"center": [x, y], "radius": radius}}
+
+
+def nose_first(x: float, y: float) -> dict[str, Any]:
+    """Return a finish that a car comes to eastwards, 1.5 m behind its front."""
+    return {**ends_at(x, y, 0.1), "heading": 0.0, "heading_tolerance": 0.1}
 
 
 def wall_with_gap(gap_m: float) -> list[dict[str, Any]]:
@@ -135,6 +141,22 @@ ROWS = (
         "FINISH_CUT_OFF",
         {"obstacles": [RING], "robots": [car("r1", 4, 10, finish=ends_at(16, 10))]},
         ("r1",),
+    ),
+    Row(
+        "NO_ROOM",
+        {
+            "obstacles": wall_with_gap(3.0),
+            "robots": [car("r1", 4, 10, finish=nose_first(14.1, 4))],
+        },
+        ("the finish of r1", "with the heading wanted there", "heading_tolerance"),
+    ),
+    Row(
+        "LITTLE_ROOM",
+        {
+            "obstacles": wall_with_gap(3.0),
+            "robots": [car("r1", 4, 10, finish=nose_first(13.33, 4))],
+        },
+        ("the finish of r1", "0.02 m from obstacles", "at least 0.03 m"),
     ),
     Row(
         "FINISH_OUT_OF_ENERGY",

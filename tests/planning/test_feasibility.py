@@ -126,6 +126,45 @@ def test_a_goal_only_the_rear_axle_can_enter_is_reachable(yard: MakeScene) -> No
     assert proof_of_infeasibility(yard(goals=goals)) is None
 
 
+# --- no room for the body -----------------------------------------------------------
+
+
+def beside_a_wall(heading: float, tolerance: float = 0.1) -> dict[str, Any]:
+    """Return a place whose middle is 0.7 m from the wall at x = 15, gap elsewhere."""
+    return {
+        "circle": {"center": [14.1, 4], "radius": 0.1},
+        "heading": heading,
+        "heading_tolerance": tolerance,
+    }
+
+
+@pytest.mark.parametrize(
+    ("heading", "tolerance", "provable"),
+    [(0.0, 0.1, True), (pi / 2, 0.1, False), (pi, 0.1, False), (0.0, 3.0, False)],
+)
+def test_a_body_must_fit_where_it_stops(
+    yard: MakeScene, heading: float, tolerance: float, provable: bool
+) -> None:
+    """Nose first, a car whose front is 1.5 m ahead of its middle meets the wall."""
+    place = beside_a_wall(heading, tolerance)
+    wall = wall_with_gap(3.0)
+    finish = yard(obstacles=wall, robots=[car("r1", 4, 10, finish=place)])
+    goal = yard(obstacles=wall, goals=[{"id": "dock", **place}])
+    for scene, name in ((finish, "the finish of r1"), (goal, "goal dock")):
+        proof = proof_of_infeasibility(scene)
+        assert (proof is not None) is provable
+        assert proof is None or name in proof
+        assert proof is None or "with the heading wanted there" in proof
+
+
+def test_a_place_is_for_whoever_has_room_there(yard: MakeScene) -> None:
+    goals = [{"id": "dock", **beside_a_wall(0.0)}]
+    robots = [car("r1", 4, 6), {"id": "r2", "model": "diffdrive", "pose": [4, 14, 0]}]
+    scene = yard(obstacles=wall_with_gap(3.0), goals=goals, robots=robots)
+    assert proof_of_infeasibility(scene) is None
+    assert list(impossible_goals(yard(obstacles=wall_with_gap(3.0), goals=goals)))
+
+
 # --- goals out of energy's reach ----------------------------------------------------
 
 

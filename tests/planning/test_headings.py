@@ -161,3 +161,26 @@ def test_cars_come_to_poses_that_they_find_no_motion_to_at_once() -> None:
         source="poses",
     )
     planned(scene)
+
+
+@pytest.mark.parametrize("aside_m", [0.0, 0.1, 0.16])
+def test_cars_enter_bays_beside_the_middle_of_their_finish(
+    yard: MakeScene, aside_m: float
+) -> None:
+    """A bay 12 cm wider than the car: in the finish's own pose it has no room."""
+    half = 0.5 * 1.1 + 0.06
+    walls = [
+        {
+            "id": name,
+            "box": {"center": [x, 13], "size": [1, 6]},
+            "height": 1,
+        }
+        for name, x in (("left", 9.5 - half), ("right", 10.5 + half))
+    ]
+    finish = {
+        "circle": {"center": [10 + aside_m, 12.5], "radius": 0.35},
+        "heading": 1.5708 + 0.6 * aside_m,
+        "heading_tolerance": 0.2,
+    }
+    robot = {"id": "r1", "model": "car", "pose": [4, 4, 0.3], "finish": finish}
+    planned(yard(obstacles=walls, goals=[], robots=[robot]))

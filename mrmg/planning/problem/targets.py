@@ -9,6 +9,7 @@ import numpy as np
 from mrmg.planning.problem._region_kernels import REGION, Zones
 from mrmg.planning.problem._target_kernels import TARGET, Targets
 from mrmg.planning.roadmap.vertices import planned_regions
+from mrmg.planning.standing import Poses
 from mrmg.scene.margins import LEAST_DEFAULT_M, tracking_error
 from mrmg.scene.region import Region
 from mrmg.scene.types import Finish, Scene, Station
@@ -77,6 +78,19 @@ def target_arrays(scene: Scene) -> Targets:
         target=target,
         corner=corner,
     )
+
+
+def poses_at(targets: Targets, target: int) -> Poses:
+    """Return the poses in which a robot visits a target; its own one is in the middle.
+
+    Where the heading is free, it is 0.
+    """
+    own = targets.target[target]
+    corners = targets.corner[target, : own["corners"]]
+    radius_m = 0.0 if own["corners"] else float(own["reach"])
+    region = Region(center=own["center"], radius_m=radius_m, corners=corners)
+    tolerance_rad = min(float(own["tolerance"]), np.pi)
+    return Poses(region, float(own["heading"]), tolerance_rad)
 
 
 def _moved_corners(region: Region, by_m: float) -> np.ndarray:

@@ -20,9 +20,8 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     drive_curve,
     write_curve,
 )
-from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
-from mrmg.planning.problem._target_kernels import at_target, in_target
+from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.roadmap._heap_kernels import push
 from mrmg.world._polygon_kernels import point_distance
 
@@ -34,15 +33,6 @@ HOME_STEPS = 4000
 
 CREEPING_SHARE = 1e-3
 """Share of its top speed with which a custom motion model turns at its finish."""
-
-RINGS, BEARINGS = 4, 8
-"""Circles about a target's middle, and places on each, where a robot may end."""
-
-REGION_SHARE = 0.8
-"""Share of a target's reach, and of its tolerance of headings, that these take up."""
-
-END_SLACK_M = 0.05
-"""Clearance beyond the margin that they have: driving ends about so far off."""
 
 LEAST_NEARNESS = 0.2
 """Share of the cost of a conflict that it costs in any case."""
@@ -98,43 +88,17 @@ def steer_to(search, target, state, control):
 
 
 @kernel
-def free_pose(search, target, corner):
-    """Return (x, y, heading) at a target where there is room, nearest to its own.
-
-    It is its own if there is none, or the heading is free.
-    """
-    own, targets = search.own, search.targets
-    aim = targets.target[target]
-    x, y = aim.center[0], aim.center[1]
-    heading, tolerance = aim.heading, aim.tolerance
-    if tolerance >= pi:
-        return x, y, heading
-    margin, pose = own[0].margin + END_SLACK_M, np.zeros(3)
-    for ring in range(RINGS + 1):
-        far = REGION_SHARE * aim.reach * ring / RINGS
-        for bearing in range(BEARINGS if ring > 0 else 1):
-            angle = 2.0 * pi * bearing / BEARINGS
-            pose[0], pose[1] = x + far * cos(angle), y + far * sin(angle)
-            if not in_target(targets, target, pose[0], pose[1]):
-                continue
-            for side in (0.0, 1.0, -1.0):
-                pose[2] = heading + side * REGION_SHARE * tolerance
-                if keeps_clear(own, search.spaces, pose, margin, corner):
-                    return pose[0], pose[1], pose[2]
-    return x, y, heading
-
-
-@kernel
-def drive_to(search, target, room, control):
-    """Write a drive to a target without regard to others; return the steps, or -1.
+def drive_to(search, leg, room, control):
+    """Write a drive to where a leg ends, without others; return the steps, or -1.
 
     A car drives along the shortest curve, a robot that turns on the spot straight.
     """
-    own, targets = search.own, search.targets
+    own, targets, task = search.own, search.targets, search.task
+    target = task.leg[leg] if leg < len(task.leg) else task.finish
     course, state = room.curve, room.state
     if own[0].model == USER:
         return steer_to(search, target, state, control)
-    x, y, heading = free_pose(search, target, room.corner[0])
+    x, y, heading = task.pose[leg]
     free = targets.target[target].tolerance >= pi
     tolerance = np.inf if free else targets.target[target].tolerance
     radius = 0.0
@@ -264,5 +228,5 @@ def end_from(search, nodes, room, a, tries):
         return
     finish = search.task.finish
     if finish >= 0 and is_tried(search, finish, room.state[0], tries):
-        count = drive_to(search, finish, room, room.control)
+        count = drive_to(search, len(search.task.leg), room, room.control)
         add_end(search, nodes, room, a, HOME, count)

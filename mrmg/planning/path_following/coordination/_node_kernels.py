@@ -54,6 +54,7 @@ class Task(NamedTuple):
 
     Attributes:
         leg: targets to visit, in order, shape (L,).
+        pose: (x, y, yaw) that the robot drives to there, and at its finish, (L + 1, 3).
         stay: steps to stand in each of them, shape (L,).
         along: way along the path to each of them [m]; inf where it leads to none, (L,).
         rest_s: time from the end of the path on.
@@ -73,6 +74,7 @@ class Task(NamedTuple):
     """
 
     leg: np.ndarray
+    pose: np.ndarray
     stay: np.ndarray
     along: np.ndarray
     rest_s: float

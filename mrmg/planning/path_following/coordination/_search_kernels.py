@@ -181,7 +181,7 @@ def visit(search, nodes, room, a):
     """Open a drive from node a to the pose that the leg's target wants."""
     task, first, leg = search.task, nodes.node[a].step, nodes.node[a].leg
     copy_numbers(nodes.state[a], room.state[0])
-    count = drive_to(search, task.leg[leg], room, room.control)
+    count = drive_to(search, leg, room, room.control)
     last, stop = first + count, braking_steps(search.own, search.dt)
     if count < 0 or last + stop >= len(room.control):
         return
@@ -214,8 +214,7 @@ def write_controls(search, nodes, room, a, control):
         first, steps = before.step, nodes.node[b].step - before.step
         copy_numbers(nodes.state[p], room.state[0])
         if motion == VISIT:
-            target = search.task.leg[before.leg]
-            drive_to(search, target, room, control[first:])
+            drive_to(search, before.leg, room, control[first:])
             continue
         held = HOLD if motion == STAY else motion
         move(search, held, before.segment, steps, room.state, control[first:])
@@ -225,8 +224,7 @@ def write_controls(search, nodes, room, a, control):
     if nodes.node[a].motion == BRAKE:
         brake(search.own, search.dt, room.state, control[first:])
     else:
-        finish = search.task.finish
-        drive_to(search, finish, room, control[first:])
+        drive_to(search, len(search.task.leg), room, control[first:])
     return nodes.node[a].step
 
 

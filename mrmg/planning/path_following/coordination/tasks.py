@@ -15,7 +15,11 @@ from mrmg.planning.path_following.coordination._motion_kernels import WAYPOINTS
 from mrmg.planning.path_following.coordination._node_kernels import Task
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.path_following.coordination.rounds import Round
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import poses_at
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+from mrmg.planning.standing import roomiest_pose
 
 MOTION_SHARE = 0.6
 """Way that a motion leads at full speed, in lengths of the robot."""
@@ -34,6 +38,10 @@ HEADINGS = 18
 
 LEVELS = 2
 """Cells of speed and of steering to either side of zero."""
+
+END_SLACK_M = 0.05
+"""Clearance beyond the margin that robots end with where they can: driving ends about
+so far off."""
 
 HOLD_SHARE = 0.3
 """Cost of standing, as a share of that of moving: it takes time, but no energy."""
@@ -86,6 +94,29 @@ def is_one_pose(problem: Problem, r: int, tour: Sequence[int]) -> bool:
     return len(tour) == 1 and bool(np.isfinite(problem.aims(r, tour)).all())
 
 
+def end_poses(problem: Problem, r: int, targets: Sequence[int]) -> np.ndarray:
+    """Return (x, y, yaw) that robot r drives to at targets, shape (L, 3); 0 at none.
+
+    That is the middle, and the heading that is wanted there; where the robot has no
+    room in that pose, the one in which it has most.
+    """
+    own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
+    enough_m, corner = own[0]["margin"] + END_SLACK_M, np.empty((MOST_CORNERS, 2))
+    pose = np.zeros((len(targets), 3))
+    for i, target in enumerate(targets):
+        if target < 0:
+            continue
+        poses = poses_at(problem.mission.targets, target)
+        pose[i] = *poses.region.center, poses.heading_rad
+        if poses.tolerance_rad < pi and not keeps_clear(
+            own, spaces, pose[i], enough_m, corner
+        ):
+            robot = problem.scene.robots[r]
+            best = roomiest_pose(problem.scene, robot, poses, enough_m)
+            pose[i] = best[0] if best else pose[i]
+    return pose
+
+
 def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
     """Return how long robot r stays at targets at most [s], shape (L,)."""
     targets, robot = problem.mission.targets, problem.mission.fleet[r]
@@ -135,6 +166,7 @@ def task_of(
     sides = [0.5 * top * steps * dt_s, 2.0 * pi / headings, top / LEVELS, turn / LEVELS]
     return Task(
         leg=np.array(legs, np.int64),
+        pose=end_poses(problem, r, [*legs, finish]),
         stay=np.ceil(stay_s / dt_s).astype(np.int64),
         along=along,
         rest_s=0.0,

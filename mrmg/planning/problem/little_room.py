@@ -1,0 +1,54 @@
+"""Goals and finishes with less room for bodies than plans need, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mrmg.compared import compared
+from mrmg.planning.endings import LITTLE_ROOM
+from mrmg.planning.problem.openings import least_margin_m
+from mrmg.planning.problem.targets import poses_at, target_arrays, target_depth_m
+from mrmg.planning.roadmap.fleet import margins_of
+from mrmg.planning.room import words_on
+from mrmg.planning.standing import roomiest_pose
+from mrmg.scene.margins import Margins
+from mrmg.scene.types import Robot, Scene, Station
+
+
+def little_room(scene: Scene, margins: Margins) -> Iterator[str]:
+    """Yield sentences on goals and finishes with less room than plans need.
+
+    Plans enter places deeper than need be, keep to a part of the tolerance of headings,
+    and keep certified minima from obstacles, but at starts.
+
+    Args:
+        scene: the mission.
+        margins: stated for all robots.
+    """
+    targets, everybody = target_arrays(scene), scene.robots
+    finishes = [(robot.finish, (robot,)) for robot in everybody if robot.finish]
+    wanted = [*((place, everybody) for place in scene.targets()), *finishes]
+    for number, (place, robots) in enumerate(wanted):
+        if isinstance(place, Station):
+            continue
+        found: list[tuple[float, float, Robot]] = []
+        for robot in robots:
+            poses = poses_at(targets, number)
+            least_m = least_margin_m(robot, margins_of(robot, margins)[0])
+            best = roomiest_pose(scene, robot, poses, least_m)
+            room_m = max(best[1], 0.0) if best else 0.0
+            starts = (place.region.depth(np.array([robot.pose[:2]])) >= 0.0).any()
+            if room_m >= least_m or starts:
+                break
+            found.append((room_m - least_m, least_m, robot))
+        else:
+            lack_m, least_m, robot = max(found, key=lambda one: one[0])
+            most, least = compared(lack_m + least_m, least_m, 2)
+            yield LITTLE_ROOM.format(
+                most=most,
+                least=least,
+                depth_m=target_depth_m(scene),
+                **words_on(robot, place),
+            )

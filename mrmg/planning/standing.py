@@ -1,0 +1,111 @@
+"""Where a body has room at a place, or a proof that it has none: a search over poses.
+
+A box of poses (x, y, yaw) is given up where the body in its middle meets an obstacle
+even when it is shrunk by as far as its points move within the box: it then does so in
+every pose of the box. So is one that has no more room than another pose, even where it
+has most. Other boxes are divided (branch and bound).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from math import pi
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from mrmg.planning.free_ground import FreeGround
+from mrmg.scene.region import Region
+from mrmg.scene.robot_model import placed
+from mrmg.scene.types import Finish, Goal, Robot, Scene
+
+FINEST_M = 0.004
+"""How far points of the body move within boxes that are no longer divided."""
+
+MOST_BOXES = 20_000
+"""Boxes that are looked at together at most: a fifth of a second, and 20 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Poses of a robot: the reference point in a region, the yaw about a heading.
+
+    Attributes:
+        region: of the reference point.
+        heading_rad: of the robot.
+        tolerance_rad: by which the yaw may differ from it, at most pi.
+    """
+
+    region: Region
+    heading_rad: float
+    tolerance_rad: float
+
+    @staticmethod
+    def at(place: Goal | Finish) -> Poses:
+        """Return the poses that count as being at a place."""
+        if place.heading_rad is None:
+            return Poses(place.region, 0.0, pi)
+        return Poses(place.region, place.heading_rad, place.heading_tolerance_rad)
+
+
+def roomiest_pose(
+    scene: Scene, robot: Robot, poses: Poses, enough_m: float = 0.0
+) -> tuple[np.ndarray, float] | None:
+    """Return the pose in which a body is farthest from obstacles, or far enough.
+
+    None if it surely meets an obstacle, or leaves the map, in every pose.
+
+    Args:
+        scene: gives obstacles and bounds.
+        robot: the body.
+        poses: from which one is chosen.
+        enough_m: distance from obstacles that is far enough.
+
+    Returns:
+        (x [m], y [m], yaw [rad]), shape (3,), and how far the body is from obstacles
+        there [m]. That is less than 0 if no pose is known, as it hardly fits in any.
+    """
+    outline, reach_m = robot.model.footprint_m, robot.model.circumscribed_radius_m
+    low_m, high_m = np.reshape(shapely.bounds(poses.region.shape), (2, 2))
+    boxes = np.array([[*(low_m + high_m) / 2.0, poses.heading_rad]])
+    half = np.array([*(high_m - low_m) / 2.0, poses.tolerance_rad])
+    ground = FreeGround.of(scene, robot)
+    land = shapely.box(*ground.bounds)
+    near = shapely.box(*low_m, *high_m).buffer(reach_m + enough_m)
+    walls = shapely.intersection(ground.obstacles, near)
+    edges = shapely.union(walls, land.exterior)
+    shapely.prepare([walls, land])
+
+    def meets(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        bodies = shapely.polygons(placed(outline, boxes))
+        return bodies, shapely.intersects(walls, bodies) | ~shapely.covers(land, bodies)
+
+    best, best_m = boxes[0], -np.inf
+    while len(boxes) <= MOST_BOXES:
+        depth_m, off_m = poses.region.depth(boxes[:, :2]), float(np.hypot(*half[:2]))
+        moved_m = half * (1.0, 1.0, reach_m)
+        stray_m = off_m + moved_m[2]
+        bodies, met = meets(outline)
+        room_m = np.where(met, -np.inf, shapely.distance(edges, bodies))
+        inside_m = np.where(depth_m >= 0.0, room_m, -np.inf)
+        if inside_m.max() > best_m:
+            best, best_m = boxes[inside_m.argmax()], inside_m.max()
+        if best_m >= enough_m:
+            return best, float(best_m)
+        left = (depth_m >= -off_m) & (np.maximum(room_m, 0.0) + stray_m > best_m)
+        core = Polygon(outline).buffer(-stray_m, join_style="mitre")
+        if not core.is_empty:
+            largest = max(shapely.get_parts(core), key=shapely.area)
+            left &= ~meets(shapely.get_coordinates(largest.exterior)[:-1])[1]
+        boxes = boxes[left]
+        if not len(boxes):
+            return None if best_m < 0.0 else (best, float(best_m))
+        if moved_m.max() < FINEST_M:
+            break
+        divided = moved_m > moved_m.max() / 2.0
+        half = np.where(divided, half / 2.0, half)
+        steps = [(-1.0, 1.0) if each else (0.0,) for each in divided]
+        boxes = np.concatenate([boxes + half * step for step in product(*steps)])
+    return best, float(best_m)
