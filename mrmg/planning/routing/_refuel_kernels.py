@@ -237,7 +237,7 @@ def leg_of(legs, own, a, b):
 
 
 @kernel
-def label_route(legs, labels, r, goal, length, held, plain):
+def label_route(legs, labels, r, goal, length, held):
     """Write the labels of a route and return (cost, time, label) of its best way.
 
     The way is the best by the weights of the objective among those within the limit;
@@ -248,7 +248,6 @@ def label_route(legs, labels, r, goal, length, held, plain):
         legs, labels, r: the problem, and robot r's labels in it.
         goal, length: the route's goals.
         held: steps from the start and the finish whose labels hold already.
-        plain: whether no station is needed.
     """
     legs, labels, goal = borrowed((legs, labels, goal))
     own, home, slot, paths = legs.table[r], legs.home[r], 0, 0
@@ -268,7 +267,7 @@ def label_route(legs, labels, r, goal, length, held, plain):
             if step < held[end]:
                 continue
             a, b = (place, last) if end else (last, place)
-            if stations > 0 and not plain:
+            if stations > 0:
                 key, slot = key_and_slot(labels.pair, legs.cost.shape[1], own, a, b)
                 if labels.pair[slot] != key:
                     slot_of(legs, labels, own, a, b)

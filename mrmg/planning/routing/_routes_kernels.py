@@ -9,8 +9,7 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.routing._insertion_kernels import value_with
-from mrmg.planning.routing._legs_kernels import MISSING, USABLE
-from mrmg.planning.routing._random_kernels import random_unit
+from mrmg.planning.routing._legs_kernels import USABLE
 from mrmg.planning.routing._refuel_kernels import (
     LEAST,
     LEAST_DRAW,
@@ -38,8 +37,6 @@ class Routes(NamedTuple):
         known: shape (R + 1, 3).
         front, back: steps from start and finish whose labels hold, shape (R + 1,).
             After n goals front is n + 2 if all is up to date.
-        plain: 1 where the battery lasts for the route without a station, and labels
-            are of that way alone, shape (R + 1,).
     """
 
     goal: np.ndarray
@@ -47,7 +44,6 @@ class Routes(NamedTuple):
     known: np.ndarray
     front: np.ndarray
     back: np.ndarray
-    plain: np.ndarray
 
 
 def new_routes(robots: int, goals: int) -> Routes:
@@ -56,7 +52,6 @@ def new_routes(robots: int, goals: int) -> Routes:
         np.zeros((robots + 1, goals), np.int64),
         np.zeros(robots + 1, np.int64),
         np.zeros((robots + 1, 3)),
-        np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
     )
@@ -71,7 +66,6 @@ def copy_routes(source, copy):
         copy_numbers(source.known[r], copy.known[r])
         copy.front[r] = source.front[r]
         copy.back[r] = source.back[r]
-        copy.plain[r] = source.plain[r]
 
 
 @kernel
@@ -90,44 +84,16 @@ def copy_labels(legs, routes, source, copy):
 
 
 @kernel
-def update(legs, routes, labels, shorter):
-    """Bring labels and costs of changed routes up to date.
-
-    Args:
-        legs, routes, labels: the problem, and what is to be brought up to date.
-        shorter: whether goals were taken out.
-    """
+def update(legs, routes, labels):
+    """Bring labels and costs of changed routes up to date."""
     for r in range(len(routes.length) - 1):
-        if routes.front[r] < routes.length[r] + 2:
-            suffices = not legs.timed and lasts(legs, routes, r)
-            plain = routes.plain[r] == 1
-            if plain != suffices and (plain or shorter):
-                routes.plain[r] = suffices
-                routes.front[r] = routes.back[r] = 0
-            label(legs, routes, labels, r)
-
-
-@kernel
-def lasts(legs, routes, r):
-    """Return whether the battery lasts for a route without a station."""
-    own, last, drawn = legs.table[r], legs.home[r], legs.robot[r, MISSING]
-    for i in range(routes.length[r]):
-        drawn += legs.cost[own, last, routes.goal[r, i]]
-        last = routes.goal[r, i]
-    drawn += legs.cost[own, last, legs.home[r]]
-    return drawn <= legs.robot[r, USABLE] * (1.0 + ROUNDING)
-
-
-@kernel
-def label(legs, routes, labels, r):
-    """Bring labels and cost of a route up to date."""
-    held, n = (routes.front[r], routes.back[r]), routes.length[r]
-    plain = routes.plain[r] == 1
-    cost, time, best = label_route(legs, labels, r, routes.goal[r], n, held, plain)
-    routes.known[r, COST] = cost
-    routes.known[r, TIME] = time
-    routes.known[r, LABEL] = best
-    routes.front[r] = routes.back[r] = n + 2
+        held, n = (routes.front[r], routes.back[r]), routes.length[r]
+        if held[0] < n + 2:
+            cost, time, best = label_route(legs, labels, r, routes.goal[r], n, held)
+            routes.known[r, COST] = cost
+            routes.known[r, TIME] = time
+            routes.known[r, LABEL] = best
+            routes.front[r] = routes.back[r] = n + 2
 
 
 @kernel
@@ -144,7 +110,7 @@ def objective(legs, routes):
 
 
 @kernel
-def bound_places(legs, routes, labels, goal, random, blink, balance):
+def bound_places(legs, routes, labels, goal, balance):
     """Return what a goal adds at least where no more stations are needed, and where.
 
     What it adds at least in each other place that may be better is noted.
@@ -152,8 +118,6 @@ def bound_places(legs, routes, labels, goal, random, blink, balance):
     Args:
         legs, routes, labels: the problem and its present routes.
         goal: on no route.
-        random: state of the generator.
-        blink: how often a place is overlooked.
         balance: by how much more a surcharge counts on a route for each joule of it.
     """
     best, robot, place, number = np.inf, -1, -1, 0
@@ -174,7 +138,7 @@ def bound_places(legs, routes, labels, goal, random, blink, balance):
             ends = labels.head[front, LEAST] + labels.head[back, LEAST]
             adds = weight * (ends + way - present)
             labels.bound[number] = np.inf
-            if adds < best and not random_unit(random) < blink:
+            if adds < best:
                 drawn = labels.head[front, LEAST_DRAW] + labels.head[back, LEAST_DRAW]
                 if drawn + way <= usable and not legs.timed:
                     best, robot, place = adds, r, i
@@ -192,14 +156,12 @@ def bound_places(legs, routes, labels, goal, random, blink, balance):
 
 
 @kernel
-def put_goal(legs, routes, labels, goal, random, blink, balance):
+def put_goal(legs, routes, labels, goal, balance):
     """Put a goal where it costs least; return whether it fits anywhere.
 
     Args:
         legs, routes, labels: the problem and its present routes.
         goal: on no route.
-        random: state of the generator.
-        blink: how often a place is overlooked.
         balance: how much more a surcharge counts on a route of mean energy than on an
             empty one, as a share.
     """
@@ -208,9 +170,7 @@ def put_goal(legs, routes, labels, goal, random, blink, balance):
         total += routes.known[r, COST] if balance > 0.0 else 0.0
         places += routes.length[r]
     balance *= len(legs.robot) / total
-    best, robot, place = bound_places(
-        legs, routes, labels, goal, random, blink, balance
-    )
+    best, robot, place = bound_places(legs, routes, labels, goal, balance)
     while True:
         number = labels.bound[:places].argmin()
         if not labels.bound[number] < best:
@@ -220,9 +180,6 @@ def put_goal(legs, routes, labels, goal, random, blink, balance):
         while number > routes.length[r]:
             number -= routes.length[r] + 1
             r += 1
-        if routes.plain[r]:
-            routes.plain[r] = routes.front[r] = routes.back[r] = 0
-            label(legs, routes, labels, r)
         weight = 1.0 + balance * routes.known[r, COST]
         value = surcharge(legs, routes, labels, (r, number), goal, best / weight)
         if weight * value < best:

@@ -35,9 +35,6 @@ from mrmg.planning.routing._ruin_kernels import (
     swap_tails,
 )
 
-BLINK = 0.01
-"""How often a place for a goal is overlooked, so that it goes elsewhere."""
-
 BALANCE = 1.0
 """How much more a surcharge counts on a route of mean energy than on an empty one, as
 a share, where goals are put on routes for the first time. Without it a few robots serve
@@ -96,12 +93,12 @@ def search(legs, state, rounds, span, random):
     legs, state, random = borrowed(legs), borrowed(state), borrowed(random)
     routes, present, best = state.routes, state.present, state.best
     robots, gone = len(legs.robot), state.gone
-    update(legs, routes, state.labels, True)
+    update(legs, routes, state.labels)
     gone[:] = 0
     for r in range(robots):
         for i in range(routes.length[r]):
             gone[routes.goal[r, i]] = routes.known[r, COST] == np.inf
-    recreate(legs, state, random, 0.0, BALANCE)
+    recreate(legs, state, random, BALANCE)
     value, best_value = objective(legs, routes), objective(legs, best)
     hot = (value - IMPOSSIBLE * routes.length[robots]) / max(1, legs.goals)
     for k in range(rounds + 1):
@@ -111,7 +108,7 @@ def search(legs, state, rounds, span, random):
                 swap_tails(routes, legs.neighbour, random)
             else:
                 choose_ruin(routes, legs.neighbour, random, state.home, gone)
-            recreate(legs, state, random, BLINK, 0.0)
+            recreate(legs, state, random, 0.0)
         found = objective(legs, routes)
         warmth = hot * span[0] * (span[1] / span[0]) ** (k / (rounds + 1))
         if k == 0 or found < value - warmth * log(1.0 - random_unit(random)):
@@ -127,18 +124,18 @@ def search(legs, state, rounds, span, random):
 
 
 @kernel
-def recreate(legs, state, random, blink, balance):
+def recreate(legs, state, random, balance):
     """Take the flagged goals out of all routes, and put absent ones where they fit."""
     routes, labels, absent = state.routes, state.labels, len(legs.robot)
     remove_goals(routes, state.gone)
-    update(legs, routes, labels, True)
+    update(legs, routes, labels)
     order_absent(legs, routes, random)
     n = routes.length[absent]
     routes.length[absent] = 0
     for i in range(n):
         goal = routes.goal[absent, i]
-        if put_goal(legs, routes, labels, goal, random, blink, balance):
-            update(legs, routes, labels, False)
+        if put_goal(legs, routes, labels, goal, balance):
+            update(legs, routes, labels)
         else:
             routes.goal[absent, routes.length[absent]] = goal
             routes.length[absent] += 1
@@ -153,6 +150,6 @@ def settle(legs, state):
     routes = state.routes
     copy_routes(state.best, routes)
     routes.front[:] = routes.back[:] = 0
-    update(legs, routes, state.labels, True)
+    update(legs, routes, state.labels)
     robots = len(routes.length) - 1
     return routes.known[:robots, COST].sum() + IMPOSSIBLE * routes.length[robots]

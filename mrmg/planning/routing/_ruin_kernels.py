@@ -15,10 +15,6 @@ more than a fifth of them, unless they are few."""
 STRINGS = 0.7
 """How often strings of routes are taken out instead of a seed's nearest goals."""
 
-ANYWHERE = 0.3
-"""How often ends of routes are exchanged that are drawn without regard to where they
-lie, half of them all goals of both: an idle robot has no goals to lie near."""
-
 MOST_TAILS = 10
 """Goals next to a goal, itself among them, that may follow it as ends are exchanged."""
 
@@ -93,14 +89,6 @@ def swap_tails(routes, neighbour, random):
     two as well if the second one comes first.
     """
     robots = len(routes.length) - 1
-    if robots > 1 and random_unit(random) < ANYWHERE:
-        a = random_below(random, robots)
-        b = (a + 1 + random_below(random, robots - 1)) % robots
-        part = random_unit(random) < 0.5
-        cut_a = random_below(random, routes.length[a] + 1) if part else 0
-        cut_b = random_below(random, routes.length[b] + 1) if part else 0
-        exchange(routes, a, cut_a, b, cut_b)
-        return
     goal = random_below(random, len(neighbour))
     near = min(MOST_TAILS, neighbour.shape[1])
     other = neighbour[goal, random_below(random, near)]

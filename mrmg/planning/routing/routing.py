@@ -13,13 +13,15 @@ from time import thread_time
 
 import numpy as np
 
-from mrmg.planning.routing._legs_kernels import Legs, new_legs
+from mrmg.planning.routing._legs_kernels import MISSING, USABLE, Legs, new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
 from mrmg.planning.routing._refuel_kernels import (
+    COST,
     FIRST,
     LAST,
     ORIGIN,
     PATH,
+    ROUNDING,
     Labels,
     place_at,
     row_of,
@@ -38,12 +40,6 @@ SPAN = 1.0, 0.01
 PARTS, MOST_GROWTH = 20, 10.0
 """Parts of a search in limited time, and by how much their rounds may grow: the next
 part has as many rounds as the last one had in a part's time."""
-
-FEW_GOALS_SPAN = 5.0, 0.5
-"""The same for few goals, whose best tours a cold search may miss for good."""
-
-FEW_GOALS = 10
-"""Goals up to which they are few."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,11 +109,10 @@ def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Ro
         _play_out(problem, params, random, routes)
     goals = int(problem.open_goal.sum())
     rounds = min(params.rounds, ROUNDS_PER_PAIR * goals**2)
-    span = FEW_GOALS_SPAN if goals <= FEW_GOALS else SPAN
     if params.limit_s is None:
-        search(legs, state, rounds, span, random)
+        search(legs, state, rounds, SPAN, random)
     else:
-        _search_in_time(legs, state, span, random, params.limit_s)
+        _search_in_time(legs, state, SPAN, random, params.limit_s)
     cost_J = float(settle(legs, state))
     tours = tuple(
         tour_of(legs, state.labels, r, routes.goal[r, :length], int(label))
@@ -157,6 +152,8 @@ def tour_of(
     if label < 0:
         return ()
     own, length = legs.table[r], len(route)
+    if _needs_no_station(legs, labels, r, route, label):
+        return tuple(route.tolist())
     targets: list[int] = []  # the last one first
     for step in range(length + 1, 0, -1):
         way = labels.way[row_of(legs, r, route, length, 0, step), label]
@@ -173,6 +170,23 @@ def tour_of(
                 stops.append(stop)
             targets += [legs.goals + each for each in reversed(stops)]
     return tuple(reversed(targets))
+
+
+def _needs_no_station(
+    legs: Legs, labels: Labels, r: int, route: np.ndarray, label: int
+) -> bool:
+    """Return whether a route costs no more without a station, and the battery lasts.
+
+    Where a station lies on the shortest way, one over it costs as much.
+    """
+    places = np.array([legs.home[r], *route, legs.home[r]])
+    leg = legs.table[r], places[:-1], places[1:]
+    usable_J = legs.robot[r, USABLE] - legs.robot[r, MISSING]
+    last = row_of(legs, r, route, len(route), 0, len(route) + 1)
+    limits_J = np.array([labels.way[last, label, COST], usable_J]) * (1.0 + ROUNDING)
+    return bool(
+        legs.cost[leg].sum() <= limits_J[0] and legs.draw[leg].sum() <= limits_J[1]
+    )
 
 
 def _search_in_time(

@@ -29,7 +29,7 @@ def refuelled(
     legs = new_legs(problem)
     labels = new_labels(legs)
     goal = np.array(route, np.int64)
-    cost, _, label = label_route(legs, labels, 0, goal, len(route), (0, 0), False)
+    cost, _, label = label_route(legs, labels, 0, goal, len(route), (0, 0))
     return cost, list(tour_of(legs, labels, 0, goal, label))
 
 
@@ -117,7 +117,7 @@ def test_one_more_goal_is_worth_what_the_longer_route_costs(
     end = int(legs.home[0])
     route = (0, 1, 2, 3)
     goals = np.array(route)
-    label_route(legs, labels, 0, goals, len(route), (0, 0), False)
+    label_route(legs, labels, 0, goals, len(route), (0, 0))
     for place in range(len(route) + 1):
         a = route[place - 1] if place > 0 else end
         b = route[place] if place < len(route) else end
@@ -174,10 +174,10 @@ def test_recharging_takes_its_time_and_routes_keep_their_limit(
     legs = new_legs(problem)
     labels = new_labels(legs)
     goal, end = np.array([0]), int(legs.home[0])
-    cost, time_s, _ = label_route(legs, labels, 0, goal, 1, (0, 0), False)
+    cost, time_s, _ = label_route(legs, labels, 0, goal, 1, (0, 0))
     kept = slack_s > 0.0
     assert (cost, time_s) == ((finish_m, expected_s) if kept else (np.inf, np.inf))
-    label_route(legs, labels, 0, goal, 0, (0, 0), False)
+    label_route(legs, labels, 0, goal, 0, (0, 0))
     before, behind = ((row_of(legs, 0, goal, 0, side, 0), end) for side in range(2))
     value = value_with(legs, labels, 0, before, 0, behind, 0.0, np.inf)
     assert value == pytest.approx(finish_m + 1.001 * expected_s if kept else np.inf)
