@@ -184,3 +184,17 @@ def test_cars_enter_bays_beside_the_middle_of_their_finish(
     }
     robot = {"id": "r1", "model": "car", "pose": [4, 4, 0.3], "finish": finish}
     planned(yard(obstacles=walls, goals=[], robots=[robot]))
+
+
+def test_later_attempts_lead_along_paths_to_single_poses(yard: MakeScene) -> None:
+    """The first one takes what the search finds at once: it turns far too much."""
+    finish = {
+        "circle": {"center": [11.75, 5.76], "radius": 0.35},
+        "heading": 0.085,
+        "heading_tolerance": 0.15,
+    }
+    robot = {"id": "r1", "model": "car", "pose": [8.71, 6.59, 0.063], "finish": finish}
+    scene = yard(goals=[], robots=[robot])
+    first = verified_plan(scene, 0, QUICK)
+    later = verified_plan(scene, 0, PlannerParams(improvements=1))
+    assert later.cost_J < 0.8 * first.cost_J
