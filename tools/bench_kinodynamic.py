@@ -255,7 +255,7 @@ def robot_entry(
     radius = 0.5 if car else (0.05 if "first" in entry["type"] else 0.2)
     center = [size * x for x in goal[:2]]
     finish: dict[str, Any] = {"circle": {"center": center, "radius": size * radius}}
-    if not car:
+    if len(goal) > 2:  # of cars only x and y
         finish["heading"] = goal[2]
     pose = [size * start[0], size * start[1], yaw]
     return {"id": name, "model": model, "pose": pose, "finish": finish}

@@ -10,6 +10,8 @@ seen. The same seed gives the same file.
 - alcove: two first-order unicycles change ends of a corridor too narrow to pass in; one
   of them can wait in an alcove.
 - lanes: a second-order car of 1 x 1 m drives up and down lanes 1.3 to 2.2 m wide.
+- bay: such a car ends in a bay 0.1 to 0.3 m wider than itself, along it, and within
+  0.5 m of a place beside the bay's middle.
 - crowd4, crowd8: first-order unicycles of 0.8 x 0.8 m among ten boxes on 10 x 10 m
   start and end as close to them as 0.03 m.
 """
@@ -122,14 +124,14 @@ def unicycle(start: Sequence[float], goal: Sequence[float]) -> Document:
 
 
 def car(start: Sequence[float], goal: Sequence[float]) -> Document:
-    """Return a second-order car of 1 x 1 m that may end with any heading."""
+    """Return a second-order car of 1 x 1 m; goals without headings leave them free."""
     x, y, theta = start
     return rounded(
         {
             "type": "kcbs_second_order_car",
             "size": [1.0, 1.0],
             "start": [x, y, 0.0, 0.0, theta],
-            "goal": list(goal[:2]),
+            "goal": list(goal),
         }
     )
 
@@ -137,7 +139,8 @@ def car(start: Sequence[float], goal: Sequence[float]) -> Document:
 def yard(rng: np.random.Generator, cars: int) -> Document:
     """Return a dense yard."""
     place, starts, goals = drawn_yard(rng, YARD, cars)
-    return {"environment": place, "robots": [*map(car, starts, goals)]}
+    ends = [goal[:2] for goal in goals]
+    return {"environment": place, "robots": [*map(car, starts, ends)]}
 
 
 def crowd(rng: np.random.Generator, robots: int) -> Document:
@@ -261,6 +264,17 @@ def lanes(rng: np.random.Generator) -> Document:
     return {"environment": place, "robots": [car(start, goal)]}
 
 
+def bay(rng: np.random.Generator) -> Document:
+    """Return a car that ends in a bay, beside its middle."""
+    wide, deep, at = 1.0 + rng.uniform(0.1, 0.3), rng.uniform(1.5, 2.5), 5.0
+    y = YARD_M - deep / 2
+    boxes = [(at + side * (wide / 2 + 0.5), y, 1.0, deep) for side in (-1.0, 1.0)]
+    start = (rng.uniform(2.0, 8.0), rng.uniform(1.5, 4.0), rng.uniform(-pi, pi))
+    goal = (at + rng.uniform(-0.3, 0.3), y, rng.choice([-pi / 2, pi / 2]))
+    place = world(YARD_M, YARD_M, boxes)
+    return {"environment": place, "robots": [car(start, goal)]}
+
+
 CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "yard6": lambda rng: yard(rng, 6),
     "yard7": lambda rng: yard(rng, 7),
@@ -270,6 +284,7 @@ CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "window": window,
     "alcove": alcove,
     "lanes": lanes,
+    "bay": bay,
     "crowd4": lambda rng: crowd(rng, 4),
     "crowd8": lambda rng: crowd(rng, 8),
 }
