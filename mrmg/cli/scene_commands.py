@@ -59,6 +59,7 @@ def list_(options: argparse.Namespace) -> None:
 def check(options: argparse.Namespace) -> None:
     """Report what `mrmg run` would refuse of a scene, and what it warns of."""
     from mrmg.planning.feasibility import mission_warnings
+    from mrmg.planning.problem.little_room import little_room
     from mrmg.planning.roadmap.fleet import margins_of
     from mrmg.runs.pipeline import rehearse
     from mrmg.scene.loading import load_scene
@@ -77,7 +78,8 @@ def check(options: argparse.Namespace) -> None:
             terminal.print_warnings(warnings)
         raise
     warnings += bend_warnings(scene)
-    warnings += [Fault("", message) for message in mission_warnings(scene)]
+    found = mission_warnings(scene) or little_room(scene, STATES_NONE)
+    warnings += [Fault("", message) for message in found]
     counts = {
         "robot": len(scene.robots),
         "goal": len(scene.goals),

@@ -33,7 +33,7 @@ NO_ROOM = (
     "meet an obstacle or leave the map; {remedy} would help"
 )
 LITTLE_ROOM = (
-    "{place} has too little room for {robot}: {depth_m:g} m deep in it, where plans "
+    "{place} has too little room for {robot}: {depth_m:.2f} m deep in it, where plans "
     "lead, the body{heading} is at most {most} m from obstacles, and plans keep at "
     "least {least} m from them; {remedy} would help"
 )

@@ -198,6 +198,43 @@ def test_check_gives_faults_as_json(
     assert len(found["warnings"]) == 3
 
 
+DOCK = """\
+format: 1
+name: dock
+bounds: [0, 0, 20, 12]
+obstacles:
+  - {id: wall, box: {center: [16, 6], size: [2, 6]}, height: 1}
+battery: {capacity_m: 100}
+goals:
+  - {id: dock, circle: {center: [CENTER, 6], radius: 0.1}, heading: 0.0}
+robots:
+  - {id: r1, model: car, pose: [3, 3, 0]}
+"""
+"""A car's front is 1.5 m ahead of its reference point, and the wall at x = 15 m."""
+
+
+@pytest.mark.parametrize(
+    ("center", "words"),
+    [
+        ("13.3", ()),
+        ("13.53", ("goal dock has too little room", "0.05 m deep", "at most 0.02 m")),
+        ("13.7", ("goal dock is unreachable", "with the heading wanted there")),
+    ],
+)
+def test_check_warns_of_places_without_room(
+    center: str,
+    words: tuple[str, ...],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "dock.yaml"
+    path.write_text(DOCK.replace("CENTER", center))
+    assert main(["scene", "check", str(path)]) == ExitCode.OK
+    warnings = [line for line in capsys.readouterr().out.splitlines() if "warn" in line]
+    assert len(warnings) == bool(words)
+    assert all(word in warnings[0] for word in words)
+
+
 @pytest.mark.parametrize("name", shipped.scene_names())
 def test_nothing_is_amiss_with_shipped_scenes(
     name: str, capsys: pytest.CaptureFixture[str]

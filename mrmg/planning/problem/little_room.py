@@ -9,7 +9,7 @@ import numpy as np
 from mrmg.compared import compared
 from mrmg.planning.endings import LITTLE_ROOM
 from mrmg.planning.problem.openings import least_margin_m
-from mrmg.planning.problem.targets import poses_at, target_arrays, target_depth_m
+from mrmg.planning.problem.targets import poses_at, target_arrays
 from mrmg.planning.roadmap.fleet import margins_of
 from mrmg.planning.room import words_on
 from mrmg.planning.standing import roomiest_pose
@@ -34,13 +34,16 @@ def little_room(scene: Scene, margins: Margins) -> Iterator[str]:
         if isinstance(place, Station):
             continue
         found: list[tuple[float, float, Robot]] = []
+        poses = poses_at(targets, number)
+        middle = np.array([place.region.center])
+        depth_m = (place.region.depth(middle) - poses.region.depth(middle)).item()
         for robot in robots:
-            poses = poses_at(targets, number)
             least_m = least_margin_m(robot, margins_of(robot, margins)[0])
+            if (place.region.depth(np.array([robot.pose[:2]])) >= 0.0).any():
+                break
             best = roomiest_pose(scene, robot, poses, least_m)
             room_m = max(best[1], 0.0) if best else 0.0
-            starts = (place.region.depth(np.array([robot.pose[:2]])) >= 0.0).any()
-            if room_m >= least_m or starts:
+            if room_m >= least_m:
                 break
             found.append((room_m - least_m, least_m, robot))
         else:
@@ -49,6 +52,6 @@ def little_room(scene: Scene, margins: Margins) -> Iterator[str]:
             yield LITTLE_ROOM.format(
                 most=most,
                 least=least,
-                depth_m=target_depth_m(scene),
+                depth_m=depth_m,
                 **words_on(robot, place),
             )
