@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from math import pi
+from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -21,8 +22,12 @@ from mrmg.scene.region import Region
 from mrmg.scene.robot_model import placed
 from mrmg.scene.types import Finish, Goal, Robot, Scene
 
-FINEST_M = 0.004
-"""How far points of the body move within boxes that are no longer divided."""
+ACCURACY_M = 0.008
+"""How much more room there may be in another pose, unless it is asked for better."""
+
+FINEST_SHARE = 0.25
+"""How far points of the body move within boxes that are no longer divided, as a share
+of that."""
 
 MOST_BOXES = 20_000
 """Boxes that are looked at together at most: a fifth of a second, and 20 MB."""
@@ -50,9 +55,28 @@ class Poses:
         return Poses(place.region, place.heading_rad, place.heading_tolerance_rad)
 
 
+class Room(NamedTuple):
+    """How much room there is in some poses.
+
+    Attributes:
+        pose: the best one known: (x [m], y [m], yaw [rad]), shape (3,).
+        room_m: how far the body is from obstacles there; -inf if it meets some, and no
+            pose is known in which it does not.
+        most_m: in no pose it is farther.
+    """
+
+    pose: np.ndarray
+    room_m: float
+    most_m: float
+
+
 def roomiest_pose(
-    scene: Scene, robot: Robot, poses: Poses, enough_m: float = 0.0
-) -> tuple[np.ndarray, float] | None:
+    scene: Scene,
+    robot: Robot,
+    poses: Poses,
+    enough_m: float = 0.0,
+    accuracy_m: float = ACCURACY_M,
+) -> Room | None:
     """Return the pose in which a body is farthest from obstacles, or far enough.
 
     None if it surely meets an obstacle, or leaves the map, in every pose.
@@ -62,10 +86,7 @@ def roomiest_pose(
         robot: the body.
         poses: from which one is chosen.
         enough_m: distance from obstacles that is far enough.
-
-    Returns:
-        (x [m], y [m], yaw [rad]), shape (3,), and how far the body is from obstacles
-        there [m]. That is less than 0 if no pose is known, as it hardly fits in any.
+        accuracy_m: by which it may be less than the most.
     """
     outline, reach_m = robot.model.footprint_m, robot.model.circumscribed_radius_m
     low_m, high_m = np.reshape(shapely.bounds(poses.region.shape), (2, 2))
@@ -78,34 +99,41 @@ def roomiest_pose(
     edges = shapely.union(walls, land.exterior)
     shapely.prepare([walls, land])
 
-    def meets(outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        bodies = shapely.polygons(placed(outline, boxes))
-        return bodies, shapely.intersects(walls, bodies) | ~shapely.covers(land, bodies)
+    def meets(bodies: np.ndarray) -> np.ndarray:
+        outside = ~shapely.covers(land, bodies)
+        return np.asarray(outside | shapely.intersects(walls, bodies))
 
-    best, best_m = boxes[0], -np.inf
+    best, best_m, bound_m = boxes[0], -inf, np.array([inf])
     while len(boxes) <= MOST_BOXES:
         depth_m, off_m = poses.region.depth(boxes[:, :2]), float(np.hypot(*half[:2]))
         moved_m = half * (1.0, 1.0, reach_m)
         stray_m = off_m + moved_m[2]
-        bodies, met = meets(outline)
-        room_m = np.where(met, -np.inf, shapely.distance(edges, bodies))
-        inside_m = np.where(depth_m >= 0.0, room_m, -np.inf)
+        bodies = shapely.polygons(placed(outline, boxes))
+        room_m = np.where(meets(bodies), -inf, shapely.distance(edges, bodies))
+        inside_m = np.where(depth_m >= 0.0, room_m, -inf)
         if inside_m.max() > best_m:
-            best, best_m = boxes[inside_m.argmax()], inside_m.max()
+            best, best_m = boxes[inside_m.argmax()], float(inside_m.max())
         if best_m >= enough_m:
-            return best, float(best_m)
-        left = (depth_m >= -off_m) & (np.maximum(room_m, 0.0) + stray_m > best_m)
-        core = Polygon(outline).buffer(-stray_m, join_style="mitre")
-        if not core.is_empty:
-            largest = max(shapely.get_parts(core), key=shapely.area)
-            left &= ~meets(shapely.get_coordinates(largest.exterior)[:-1])[1]
+            return Room(best, best_m, inf)
+        bound_m = np.maximum(room_m, 0.0) + stray_m
+        left = (depth_m >= -off_m) & (bound_m > best_m + accuracy_m)
+        core = _shrunk(outline, stray_m)
+        if len(core):
+            left &= ~meets(shapely.polygons(placed(core, boxes)))
         boxes = boxes[left]
         if not len(boxes):
-            return None if best_m < 0.0 else (best, float(best_m))
-        if moved_m.max() < FINEST_M:
+            return Room(best, best_m, best_m + accuracy_m) if best_m >= 0.0 else None
+        if moved_m.max() < FINEST_SHARE * accuracy_m:
             break
         divided = moved_m > moved_m.max() / 2.0
         half = np.where(divided, half / 2.0, half)
         steps = [(-1.0, 1.0) if each else (0.0,) for each in divided]
         boxes = np.concatenate([boxes + half * step for step in product(*steps)])
-    return best, float(best_m)
+    return Room(best, best_m, max(float(bound_m.max()), best_m + accuracy_m))
+
+
+def _shrunk(outline: np.ndarray, by_m: float) -> np.ndarray:
+    """Return the corners of a footprint without what is near to its outline, if any."""
+    core = Polygon(outline).buffer(-by_m, join_style="mitre")
+    largest = max(shapely.get_parts(core), key=shapely.area, default=core)
+    return np.asarray(shapely.get_coordinates(largest)[:-1])

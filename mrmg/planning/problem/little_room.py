@@ -16,6 +16,9 @@ from mrmg.planning.standing import roomiest_pose
 from mrmg.scene.margins import Margins
 from mrmg.scene.types import Robot, Scene, Station
 
+ACCURACY_M = 0.001
+"""How exactly the room at a place is known."""
+
 
 def little_room(scene: Scene, margins: Margins) -> Iterator[str]:
     """Yield sentences on goals and finishes with less room than plans need.
@@ -41,11 +44,11 @@ def little_room(scene: Scene, margins: Margins) -> Iterator[str]:
             least_m = least_margin_m(robot, margins_of(robot, margins)[0])
             if (place.region.depth(np.array([robot.pose[:2]])) >= 0.0).any():
                 break
-            best = roomiest_pose(scene, robot, poses, least_m)
-            room_m = max(best[1], 0.0) if best else 0.0
-            if room_m >= least_m:
+            best = roomiest_pose(scene, robot, poses, least_m, ACCURACY_M)
+            most_m = best.most_m if best else 0.0
+            if most_m >= least_m:
                 break
-            found.append((room_m - least_m, least_m, robot))
+            found.append((most_m - least_m, least_m, robot))
         else:
             lack_m, least_m, robot = max(found, key=lambda one: one[0])
             most, least = compared(lack_m + least_m, least_m, 2)

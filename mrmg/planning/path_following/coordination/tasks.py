@@ -113,7 +113,7 @@ def end_poses(problem: Problem, r: int, targets: Sequence[int]) -> np.ndarray:
         ):
             robot = problem.scene.robots[r]
             best = roomiest_pose(problem.scene, robot, poses, enough_m)
-            pose[i] = best[0] if best else pose[i]
+            pose[i] = best.pose if best else pose[i]
     return pose
 
 
