@@ -122,9 +122,9 @@ def first_segment(course, state):
 
 
 @kernel
-def at_rest(own, course, segment, state):
+def at_rest(course, segment, state):
     """Return whether a robot stands at its path's end as it is to end there."""
-    if segment < course.size[0] or not stands(own, 0, state):
+    if segment < course.size[0]:
         return False
     return lacking(course, max(course.size[0] - 1, 0), state) == 0.0
 

@@ -42,7 +42,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
     corner = np.empty((MOST_CORNERS, 2))
     segment, stood, spent = first_segment(course, state[0]), 0, 0.0
     for k in range(len(control)):
-        if at_rest(own, course, segment, state[k]):
+        if at_rest(course, segment, state[k]):
             return k, True
         before = segment
         u1, u2, segment, stood, off = track_control(
