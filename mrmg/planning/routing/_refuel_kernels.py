@@ -212,7 +212,7 @@ def extend(way, head, rows, leg, path, stops, battery):
     for j in range(paths):
         to, on = path[slot, j, TO + end], path[slot, j, ON - end]
         lowest = np.inf
-        for k in range(ways if on <= battery[0] else 0):
+        for k in range(ways):
             drawn = way[row, k, DRAW] + to
             cost = way[row, k, COST] + path[slot, j, COST]
             if drawn <= battery[0] and (cost < lowest or battery[2]):

@@ -181,3 +181,30 @@ def test_recharging_takes_its_time_and_routes_keep_their_limit(
     before, behind = ((row_of(legs, 0, goal, 0, side, 0), end) for side in range(2))
     value = value_with(legs, labels, 0, before, 0, behind, 0.0, np.inf)
     assert value == pytest.approx(finish_m + 1.001 * expected_s if kept else np.inf)
+
+
+def test_a_goal_takes_the_time_of_recharging_behind_the_next_one() -> None:
+    """Along a line at 1 m/s and 1 J/m; from 28 J, 3 J are left at the station."""
+    x = np.array([10.0, 20.0, 25.0, 0.0])  # two goals, the station and the start
+    apart, finish_m = np.abs(x[:, None] - x), 45.0
+    problem = RoutingInstance(
+        goals=2,
+        distance=apart[None, :3, :3],
+        start_distance=apart[None, 3, :3],
+        finish_distance=np.abs(finish_m - x)[None],
+        plain=np.ones(1),
+        energy=np.array([28.0]),
+        capacity=np.array([30.0]),
+        reserve=np.zeros(1),
+        time=apart[None, :, :3],
+        finish_time=np.abs(finish_m - x)[None],
+        charge_power=np.array([2.0]),
+        makespan_weight=1.0,
+    ).arrays
+    legs = new_legs(problem)
+    labels, route, end = new_labels(legs), np.array([1]), int(legs.home[0])
+    label_route(legs, labels, 0, route, 1, (0, 0))
+    before = row_of(legs, 0, route, 1, 0, 0), end
+    behind = row_of(legs, 0, route, 1, 1, 1), 1
+    value = value_with(legs, labels, 0, before, 0, behind, 0.0, np.inf)
+    assert value == pytest.approx(finish_m + 1.001 * (finish_m + 27.0 / 2.0))
