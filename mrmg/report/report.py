@@ -96,9 +96,7 @@ def _of_plan(record: RunRecord, plan: Plan) -> dict[str, Any]:
         "interval_J": planned_interval_J,
         "stops": _stops,
         "margins": sentences_on_margins(scene.robots, plan.margins),
-        "standing": {
-            robot.id: standing_of(robot.id, plan, log) for robot in scene.robots
-        },
+        "standing": {robot.id: standing_of(robot, plan, log) for robot in scene.robots},
         "staying": {
             curve.robot for curve in curves if lengths_along(curve.state)[-1] < _STILL_M
         },

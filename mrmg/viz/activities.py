@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.energy.metering import Motion
 from mrmg.energy.visits import runs
 from mrmg.plans import Plan, Visit
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
 
 DRIVING, WAITING, CHARGING, FINISHED = "driving", "waiting", "charging", "finished"
@@ -150,8 +150,13 @@ def breakdowns(log: ExecutionLog | None) -> dict[str, float]:
     return {event.robot: event.time_s for event in events if event.cause == "fault"}
 
 
-def standing_of(robot: str, plan: Plan, log: ExecutionLog | None) -> str:
-    """Return "broken down", "not used" of a robot without a tour, or ""."""
-    if robot in breakdowns(log):
+def standing_of(robot: Robot, plan: Plan, log: ExecutionLog | None) -> str:
+    """Return "broken down", "not used", or "" of a robot with a way of its own.
+
+    That is a tour, or a way to its finish.
+    """
+    if robot.id in breakdowns(log):
         return "broken down"
-    return "" if plan.tours.get(robot) else "not used"
+    pose = plan.trajectory(robot.id).state[:, :3]
+    leads_home = robot.finish is not None and bool((pose != pose[0]).any())
+    return "" if plan.tours.get(robot.id) or leads_home else "not used"

@@ -106,7 +106,7 @@ class Film:
                     robot=curve.robot,
                     charge=float(curve.energy_J[tick] / curve.battery.capacity_J),
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
-                    heading_for=self._heading_for(curve, tick),
+                    heading_for=self._heading_for(curve, tick, state[tick, :2]),
                     standing=self._standing(curve.robot, now_s),
                 )
                 for curve, state in zip(self.curves, self.log.state, strict=True)
@@ -121,13 +121,18 @@ class Film:
 
     def _standing(self, robot: str, now_s: float) -> str:
         whole = now_s < self.broken_s.get(robot, 0.0)
-        return "" if whole else standing_of(robot, self.plan, self.log)
+        return (
+            "" if whole else standing_of(self.scene.robot(robot), self.plan, self.log)
+        )
 
-    def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
+    def _heading_for(self, curve: BatteryCurve, tick: int, place: np.ndarray) -> str:
         tour = self.plan.tours.get(curve.robot, ())
         stop = int(stops_behind(tour, curve.visits, tick))
         if stop < len(tour):
             return self.names[tour[stop]]
+        finish = self.scene.robot(curve.robot).finish
+        if finish is not None and finish.region.depth(place)[0] < 0.0:
+            return "its finish"
         # The plan in force does not know where one was going that broke down.
         return "…" if curve.robot in self.broken_s else ""
 

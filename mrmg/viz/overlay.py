@@ -175,7 +175,8 @@ class Panel:
         used, end = f"{reading.used} used", self._width - 18
         self._write(pen, 18, 37, reading.clock, 37, bold=True)
         self._write(pen, end, 54, used, 16, bold=True, anchor="ra")
-        self._write(pen, 18, 90, f"{reading.goals_of(self._scene)} visited", 16)
+        if self._scene.goals:
+            self._write(pen, 18, 90, f"{reading.goals_of(self._scene)} visited", 16)
 
     def _draw_goals(self, pen: Pen, reading: Reading) -> None:
         per_row, width = self._chips()

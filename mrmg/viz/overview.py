@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 from mrmg.counted import counted
 from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.activities import breakdowns, lengths_along, standing_of, visit_ranks
@@ -186,8 +186,9 @@ def _legend(
     colors = style.scene_robot_colors(scene)
     handles: list[Patch | Line2D] = []
     for robot in scene.robots:
-        work = "" if plan is None else f": {_work(scene, plan, log, robot.id)}"
-        handles.append(Patch(facecolor=colors[robot.id], label=robot.id + work))
+        work = "" if plan is None else _work(scene, plan, log, robot)
+        label = ": ".join(filter(None, [robot.id, work]))
+        handles.append(Patch(facecolor=colors[robot.id], label=label))
     looks = {"planned path": (style.PLANNED, plan), "driven path": (style.DRIVEN, log)}
     handles += [
         Line2D(
@@ -215,12 +216,14 @@ def _legend(
     return handles + scene_drawing.map_legend(scene)
 
 
-def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str:
+def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: Robot) -> str:
     """Return what a robot's tour amounts to, and what became of the robot."""
-    tour = plan.tours.get(robot, ())
+    tour, standing = plan.tours.get(robot.id, ()), standing_of(robot, plan, log)
     goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
     words = [counted(goals, "goal")] if tour else []
-    return ", ".join([*words, *filter(None, [standing_of(robot, plan, log)])])
+    if not tour and robot.finish and standing != "not used":
+        words = ["to its finish"]
+    return ", ".join([*words, *filter(None, [standing])])
 
 
 def _title(scene: Scene, plan: Plan | None) -> str:

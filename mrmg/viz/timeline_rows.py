@@ -90,7 +90,7 @@ def timeline_rows(
         rows.append(
             TimelineRow(
                 robot=robot,
-                standing=standing_of(robot, plan, log),
+                standing=standing_of(scene.robot(robot), plan, log),
                 spans=activities(scene, curve, visits, broken_s.get(robot)),
                 visits=named_visits(scene, visits, end_s, widths_em),
             )

@@ -251,6 +251,21 @@ def test_page_says_in_its_banner_who_broke_down_and_in_tours_who_was_not_used(
     assert "r2 (broken down)" in words
 
 
+def test_a_mission_of_finishes_alone_is_told_by_them(
+    make_scene, make_plan, make_log, straight, tmp_path
+) -> None:
+    finish = {"circle": {"center": [13, 10], "radius": 0.5}}
+    robots = [{"id": "r1", "model": "car", "pose": [5, 10, 0], "finish": finish}]
+    scene = make_scene(goals=[], robots=robots)
+    plan = make_plan(scene, {"r1": straight(8.0)}, {"r1": ()})
+    fill(tmp_path, scene, plan, make_log(scene, plan))
+    write_report(tmp_path)
+    words = page_of(tmp_path).words
+    assert "1 robot reached its finish without contact" in words
+    assert "drives to its finish" in words
+    assert "not used" not in words
+
+
 def test_page_of_an_infeasible_mission_has_the_reason_and_the_map(
     make_scene, tmp_path
 ) -> None:

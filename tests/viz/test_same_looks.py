@@ -129,6 +129,35 @@ def test_robots_without_a_tour_are_called_not_used(mission, drawn, tmp_path) -> 
     assert texts.count("not used") == 2
 
 
+def test_a_robot_that_only_drives_to_its_finish_is_used(
+    make_scene, make_plan, make_log, straight
+) -> None:
+    ends = ([13, 10], [5, 4])
+    scene = make_scene(
+        robots=[
+            {
+                "id": f"r{n}",
+                "model": "car",
+                "pose": [5, 16 - 6 * n, 0],
+                "finish": {"circle": {"center": center, "radius": 0.5}},
+            }
+            for n, center in enumerate(ends, start=1)
+        ]
+    )
+    controls = {"r1": straight(8.0), "r2": []}
+    plan = make_plan(scene, controls, {"r1": (), "r2": ()})
+    log = make_log(scene, plan)
+    _, _, legend = shown((scene, plan, log))
+    assert legend[:2] == ["r1: to its finish", "r2: not used"]
+    film = Film(scene, plan, log, OPTIONS)
+    first, last = film.reading(0), film.reading(len(log.time_s) - 1)
+    assert [robot.way("to") for robot in first.robots] == [
+        "to its finish",
+        "not used",
+    ]
+    assert last.robots[0].way("to") == "tour done"
+
+
 def test_a_broken_robot_is_marked_on_map_timeline_and_video(
     mission, drawn, tmp_path
 ) -> None:
