@@ -198,3 +198,17 @@ def test_later_attempts_lead_along_paths_to_single_poses(yard: MakeScene) -> Non
     first = verified_plan(scene, 0, QUICK)
     later = verified_plan(scene, 0, PlannerParams(improvements=1))
     assert later.cost_J < 0.8 * first.cost_J
+
+
+def test_planning_ends_at_once_where_there_is_too_little_room(yard: MakeScene) -> None:
+    """The car's front is 1.5 m ahead of its middle, and the wall begins at x = 15."""
+    wall = {"id": "wall", "box": {"center": [16, 10], "size": [2, 12]}, "height": 1}
+    finish = {
+        "circle": {"center": [13.53, 10], "radius": 0.1},
+        "heading": 0.0,
+        "heading_tolerance": 0.1,
+    }
+    robot = {"id": "r1", "model": "car", "pose": [4, 10, 0], "finish": finish}
+    result = plan_mission(yard(obstacles=[wall], goals=[], robots=[robot]))
+    assert "too little room" in result.reason
+    assert result.statistics["path_following_plans"] <= 1
