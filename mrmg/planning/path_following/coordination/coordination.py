@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -43,6 +44,7 @@ from mrmg.planning.path_following.coordination.rounds import (
     Round,
 )
 from mrmg.planning.path_following.coordination.tasks import (
+    arrival_poses,
     horizon_steps,
     is_one_pose,
     task_of,
@@ -101,6 +103,7 @@ class _Planning:
         self._fields = Fields(problem)
         self._tours, self._paths = tours, paths
         self._courses = leads.courses(problem, paths, drives)
+        self._arrivals = cache(lambda r: arrival_poses(problem, r, tours[r]))
         self._follows = [  # whether it has driven along a path to all its targets
             drive is not None and 0 < len(tour) == len(path.target)
             for tour, path, drive in zip(tours, paths, drives, strict=True)
@@ -174,7 +177,8 @@ class _Planning:
             # Those that it must not meet may stand long before all others do.
             traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
         follows = self._follows[r]
-        task = task_of(self._problem, r, tour, self._paths[r], now, driven=follows)
+        arrivals, path = self._arrivals(r), self._paths[r]
+        task = task_of(self._problem, r, tour, path, arrivals, now, driven=follows)
         if known and not (follows and len(tour) > 1):
             return self._search(r, traffic, *self._in_time(r, task, fields, traffic))
         share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1

@@ -94,18 +94,19 @@ def is_one_pose(problem: Problem, r: int, tour: Sequence[int]) -> bool:
     return len(tour) == 1 and bool(np.isfinite(problem.aims(r, tour)).all())
 
 
-def end_poses(problem: Problem, r: int, targets: Sequence[int]) -> np.ndarray:
-    """Return (x, y, yaw) that robot r drives to at targets, shape (L, 3); 0 at none.
+def arrival_poses(problem: Problem, r: int, tour: Sequence[int]) -> np.ndarray:
+    """Return (x, y, yaw) that robot r drives to at its legs' targets and its finish.
 
     That is the middle, and the heading that is wanted there; where the robot has no
     room in that pose, the one in which it has most.
+
+    Returns:
+        Shape (L + 1, 3); 0 in the last row without a finish.
     """
     own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
     enough_m, corner = own[0]["margin"] + END_SLACK_M, np.empty((MOST_CORNERS, 2))
-    pose = np.zeros((len(targets), 3))
-    for i, target in enumerate(targets):
-        if target < 0:
-            continue
+    pose = np.zeros((len(tour) + int(problem.mission.targets.finish[r] < 0), 3))
+    for i, target in enumerate(tour):
         poses = poses_at(problem.mission.targets, target)
         pose[i] = *poses.region.center, poses.heading_rad
         if poses.tolerance_rad < pi and not keeps_clear(
@@ -133,6 +134,7 @@ def task_of(
     r: int,
     tour: Sequence[int],
     path: Path,
+    arrivals: np.ndarray,
     effort: Round,
     *,
     driven: bool = False,
@@ -144,6 +146,7 @@ def task_of(
         r: robot.
         tour: its targets; a finish comes last.
         path: along them, or an empty one.
+        arrivals: poses that it drives to, as of `arrival_poses`.
         effort: how hard it is searched for.
         driven: whether the path has been driven, to all targets and their headings.
     """
@@ -166,7 +169,7 @@ def task_of(
     sides = [0.5 * top * steps * dt_s, 2.0 * pi / headings, top / LEVELS, turn / LEVELS]
     return Task(
         leg=np.array(legs, np.int64),
-        pose=end_poses(problem, r, [*legs, finish]),
+        pose=arrivals,
         stay=np.ceil(stay_s / dt_s).astype(np.int64),
         along=along,
         rest_s=0.0,

@@ -34,7 +34,7 @@ def test_the_table_of_cells_is_never_full(
     robots = [{"id": "r", "model": model, "pose": [6, 10, 0]}]
     problem = state(yard(robots=robots), samples=50)
     for effort in ROUNDS:
-        task = task_of(problem, 0, [], no_path(problem, 0), effort)
+        task = task_of(problem, 0, [], no_path(problem, 0), np.zeros((1, 3)), effort)
         keys = effort.most * (len(task.motion) + OTHERS)
         assert len(empty_nodes(task).table) > keys
 

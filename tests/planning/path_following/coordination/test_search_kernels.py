@@ -14,7 +14,11 @@ from mrmg.planning.path_following.coordination._search_kernels import find_motio
 from mrmg.planning.path_following.coordination.coordination import empty_nodes
 from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.coordination.rounds import ROUNDS
-from mrmg.planning.path_following.coordination.tasks import no_path, task_of
+from mrmg.planning.path_following.coordination.tasks import (
+    arrival_poses,
+    no_path,
+    task_of,
+)
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
 from mrmg.planning.path_following.tracking import Motion, course_of, empty_path
 from mrmg.planning.problem.problem import Problem
@@ -27,7 +31,7 @@ HORIZON = 2000
 def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
     """Return controls of robot r to the first target among the others."""
     nowhere, guide = no_path(problem, r), Fields(problem).static(r, [0])
-    task = task_of(problem, r, [0], nowhere, ROUNDS[1])
+    task = task_of(problem, r, [0], nowhere, arrival_poses(problem, r, [0]), ROUNDS[1])
     search = Setting(
         own=problem.mission.fleet[r : r + 1],
         spaces=problem.mission.spaces,
