@@ -30,23 +30,21 @@ from mrmg.planning.bound._label_kernels import (
     set_trace,
 )
 
-TRIES = 50
-"""Candidates for each label; there are 20 to 45 where little is known of the rest."""
-
 
 @kernel
-def cheapest_tours(search, room):
+def cheapest_tours(search, room, work):
     """Return the least cost of each state of visits, and its tours' labels.
 
     Args:
         search: `TourSearch`.
         room: labels at most.
+        work: candidates at most.
 
     Returns:
-        (cost, last, place, parent): of each state, inf where no tours lead to it that
-        cost at most `search.most`, shape (X,); the last label of its tours; and of each
-        label as in `Labels`, empty if there are more than there is room for, or
-        TRIES times as many candidates.
+        (cost, last, place, parent, tried): of each state, inf where no tours lead to it
+        that cost at most `search.most`, shape (X,); the last label of its tours; of
+        each label as in `Labels`, empty if there are more than there is room for, or
+        more candidates than may be; and how many of these there were.
     """
     problem = search.routing
     n, start = len(search.goal_list), search.leg.shape[3]
@@ -87,11 +85,12 @@ def cheapest_tours(search, room):
                     count = _visit_goal(search, labels, r, state, g, count)
             if labels.first[state] < count <= room:
                 count = _visit_stations(search, labels, r, state, count)
-            if count > room or labels.tried[0] > TRIES * room:
-                return cost, last, labels.place[:0], labels.parent[:0]
+            tried = labels.tried[0]
+            if count > room or tried > work:
+                return cost, last, labels.place[:0], labels.parent[:0], tried
             labels.first[state + 1] = count
         _end_tours(search, labels, r, cost, last)
-    return cost, last, labels.place[:count], labels.parent[:count]
+    return cost, last, labels.place[:count], labels.parent[:count], labels.tried[0]
 
 
 @kernel
@@ -115,9 +114,7 @@ def _visit_goal(search, labels, r, state, g, count):
         most_left, source, other_left = -np.inf, NOTHING, -np.inf
         for k in np.argsort(labels.offer[:offers, 0], kind="mergesort"):
             cost, left = labels.offer[k, 0], labels.offer[k, 1]
-            # The goal it comes from, if its visits are counted.
-            origin = labels.place[labels.origin[k], 1]
-            origin = origin if search.is_counted[origin] else NOTHING
+            origin = _counted_origin(search, labels, labels.origin[k])
             if left <= other_left:
                 continue
             if left <= most_left and source in (NOTHING, origin):
@@ -151,6 +148,7 @@ def _near(search, labels, r, rest, g, ahead):
     problem, goal = search.routing, search.goal_list[g]
     counted, price = g >= search.remembered, search.price[goal]
     near = 0
+    labels.tried[0] += labels.first[rest + 1] - labels.first[rest]
     for k in range(labels.first[rest], labels.first[rest + 1]):
         node, from_arc = labels.place[k, 1], labels.place[k, 2]
         if counted and node < problem.goals:
@@ -181,24 +179,40 @@ def _offers(search, labels, r, near, goal, arc, ahead):
         ahead: what bounds the rest of the mission after it.
     """
     problem, start, price = search.routing, search.leg.shape[3], search.price[goal]
+    leg, drain = search.leg[r, :, :, goal, arc], search.drain[r, :, :, goal, arc]
     offers = 0
+    # The cheapest so far: most others leave no more energy, and need not be sorted.
+    least, least_left, least_origin = np.inf, -np.inf, NOTHING
     labels.tried[0] += near
     for k in labels.near[:near]:
         node, from_arc = labels.place[k, 1], labels.place[k, 2]
         cost, left = labels.value[k, 0], labels.value[k, 1]
-        cost += price + search.leg[r, node, from_arc, goal, arc]
+        cost += price + leg[node, from_arc]
         if problem.goals <= node < start:
             left -= search.station_drain[r, node - problem.goals, goal, arc]
         else:
-            left -= search.drain[r, node, from_arc, goal, arc]
+            left -= drain[node, from_arc]
         if left < problem.reserve[r] or cost == np.inf:
             continue
-        if cost + ahead <= search.most:
-            labels.offer[offers, 0] = cost
-            labels.offer[offers, 1] = min(left, problem.capacity[r])
-            labels.origin[offers] = k
-            offers += 1
+        if cost + ahead > search.most:
+            continue
+        left = min(left, problem.capacity[r])
+        origin = _counted_origin(search, labels, k)
+        if cost >= least and left <= least_left and least_origin in (NOTHING, origin):
+            continue
+        if cost < least:
+            least, least_left, least_origin = cost, left, origin
+        labels.offer[offers, 0], labels.offer[offers, 1] = cost, left
+        labels.origin[offers] = k
+        offers += 1
     return offers
+
+
+@kernel
+def _counted_origin(search, labels, k):
+    """Return the goal that label k is at, if its visits are counted."""
+    node = labels.place[k, 1]
+    return node if search.is_counted[node] else NOTHING
 
 
 @kernel

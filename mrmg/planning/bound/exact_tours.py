@@ -27,8 +27,9 @@ few of which are looked at ..."""
 PRUNED_GOALS = 20
 """... and the most goals of such missions, by the memory for completions (168 MB)."""
 
-MOST_LABELS = 4_000_000
-"""Labels up to which tours are exact."""
+MOST_LABELS, MOST_WORK = 4_000_000, 400_000_000
+"""Labels up to which tours are exact, by their memory, and candidates for them, by the
+time that these take."""
 
 SHARES = (0.02, 0.08, math.inf)
 """What the cheapest tours may cost more than if batteries lasted for ever, as a share
@@ -42,7 +43,7 @@ def exact_routing(problem: RoutingArrays) -> Routing | None:
 
     Returns:
         The tours, with infinite cost if there are none; None if the mission is too
-        large (`are_few`, or MOST_LABELS labels), or if time matters in it.
+        large (`are_few`, or MOST_LABELS, MOST_WORK), or if time matters in it.
     """
     timed = problem.makespan_weight > 0.0 or bool((problem.limit < np.inf).any())
     if timed or not are_few(int(problem.open_goal.sum()), len(problem.energy)):
@@ -69,7 +70,7 @@ def cheapest_tours(
     leg: np.ndarray,
     rest: Completions,
     most: float,
-    room: int = MOST_LABELS,
+    work: int = MOST_WORK,
     visits: Visits | None = None,
 ) -> tuple[Routing | None, int]:
     """Return the cheapest tours if they cost `most` or less.
@@ -80,18 +81,20 @@ def cheapest_tours(
             (R, T + 1, K, T, K).
         rest: completions of the mission.
         most: cost of tours of interest.
-        room: labels at most.
+        work: candidates for labels at most.
         visits: of goals, as in `rest`; all are remembered if None.
 
     Returns:
-        Tours, of infinite cost if all cost more, None if that takes more labels to
-        tell than there is room for; and the labels that it took.
+        Tours, of infinite cost if all cost more, None if that takes more work to tell,
+        or more labels than there is room for; and the work that it took.
     """
     visits = visits or Visits.all_remembered(problem)
     search = _search(problem, visits, leg, leg, rest, most)
-    cost, last, place, parent = _touring_kernels.cheapest_tours(search, room)
+    cost, last, place, parent, tried = _touring_kernels.cheapest_tours(
+        search, MOST_LABELS, work
+    )
     if not len(parent):
-        return None, room
+        return None, tried
     tours: list[list[int]] = [[] for _ in problem.energy]
     label = int(last[-1]) if np.isfinite(cost[-1]) else -1
     while label >= 0:
@@ -100,7 +103,7 @@ def cheapest_tours(
             tours[robot].insert(0, node)
         label = int(parent[label])
     least = float(cost[-1]) - visits.surcharge
-    return Routing(tuple(tuple(tour) for tour in tours), least), len(parent)
+    return Routing(tuple(tuple(tour) for tour in tours), least), tried
 
 
 def _search(
@@ -154,7 +157,9 @@ def least_costs(
     rest = completions(problem, visits=visits)  # drops none, as all are of interest
     search = _search(problem, visits, leg, drain, rest, math.inf)
     search = search._replace(finish=finish)
-    least, _, _, parent = _touring_kernels.cheapest_tours(search, MOST_LABELS)
+    least, _, _, parent, _ = _touring_kernels.cheapest_tours(
+        search, MOST_LABELS, MOST_WORK
+    )
     return np.asarray(least) if len(parent) else None
 
 

@@ -25,33 +25,32 @@ from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
-STEP, FINE_STEP = 0.02, 0.005
-"""Shares of what is proven by which costlier tours are looked at in the next round,
-before and after the cheapest ones of some round are known."""
+JOINED = 8, 4, 2, 1
+"""Neighbouring arcs of a border that count as one, in rounds one after the other:
+coarse arcs tell costs apart by some 4 %, in a hundredth of the work."""
+
+STEP = 0.01
+"""Share of what is proven by which costlier tours are looked at in the next round; it
+grows while that takes little more work."""
 
 LEAST_RISE = 0.001
-"""Share by which a round must raise the bound to be followed by another."""
+"""Share by which a round must raise the bound to be followed by another with the same
+arcs."""
 
-FINE_ARC_GOALS = 16
-"""Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
-otherwise labels would be too many ..."""
+MOST_LEGS = 20_000_000
+"""Legs from arc to arc at most, by their memory (160 MB); where there are more,
+neighbouring arcs always count as one."""
 
-FINE_ARC_LEGS = 20_000_000
-"""... and legs from arc to arc up to which they are, by their memory (160 MB)."""
-
-SHORT_ROUND = 1_000
-"""Labels of a round up to which the next one's step may be longer in any case."""
-
-LONG_ROUND = 100_000
-"""Labels of a round, some 0.3 s of work, after which the ways between near places are
-tightened, too: later rounds then set fewer labels, or prove more."""
+LONG_ROUND = 4_000_000
+"""Candidates of a round, some 0.1 s of work, after which the ways between near places
+are tightened, too: later rounds then look at fewer, or prove more."""
 
 NEAREST = 5
 """How many places are near to each place."""
 
-WORK_LABELS = 8_000_000
-"""Labels that all rounds may set: some 6 s of one processor. The limit counts work, not
-time, so that the same mission has the same bound on every machine."""
+WORK = 200_000_000
+"""Candidates for labels in all rounds: some 4 s of one processor. The limit counts
+work, not time, so that the same mission has the same bound on every machine."""
 
 Pairs = dict[tuple[int, Pair], ArcWays]
 """Ways by their identities and pairs of places."""
@@ -65,14 +64,14 @@ def touring_bound_J(
     *,
     visits: Visits | None = None,
     rounds: int,
-    work: int = WORK_LABELS,
+    work: int = WORK,
     halt: np.ndarray = NEVER,
 ) -> float:
     """Return a lower bound of the cost of all tours.
 
     Each round looks for the cheapest tours by arcs among those that cost little more
     than what is proven, which proves as much if there are none, and tightens the ways
-    that the cheapest ones take; those to all near places, too, once a round gets long.
+    that the cheapest ones take. Once that proves no more, arcs are cut in two.
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
@@ -82,50 +81,42 @@ def touring_bound_J(
         price: cost of a metre of plain ground of each robot, shape (R,).
         visits: of goals; all are remembered if None.
         rounds: how often at most.
-        work: labels that all rounds may set.
+        work: candidates for labels that all rounds may look at.
         halt: shape (1,); no round begins once it has turned true.
     """
     visits = visits or Visits.all_remembered(problem)
     best, pairs = relaxed.cost_J, _pairs_of(ways, relaxed.tours)
-    settled_J, rest, cheapest, all_near = -math.inf, None, False, False
-    step, labels = STEP, 0
-    leg = _room_for_legs(ways, problem.goals)
-    for _ in range(rounds):
-        tightened = _tighten(pairs)
-        if halt[0] or (cheapest and not tightened):
-            break
-        _write_legs(leg, ways, price)
-        rest = rest or completions(problem, leg, visits)
-        best = max(best, float(rest.before[0]) - visits.surcharge)
-        most = (1.0 + step) * best
-        before = labels
-        found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
-        work -= labels
-        if found is None:
-            break
-        enough, cheapest = False, found.feasible
-        if cheapest:
-            best, pairs = max(best, found.cost_J), _pairs_of(ways, found.tours)
-            enough = best < (1.0 + LEAST_RISE) * settled_J
-            settled_J, step = best, FINE_STEP
-        else:
-            best = max(best, most)
-            step = _longer(step, labels, before)
-        if enough or labels >= work:
-            break
-        if labels > LONG_ROUND and not all_near:
-            pairs, rest, all_near = pairs | _near_pairs(ways), None, True
+    table, rest, tried, all_near = _room_for_legs(ways), None, 0, False
+    for joined in JOINED:
+        settled_J, step = -math.inf, STEP
+        while rounds > 0 and not halt[0]:
+            tightened = _tighten(pairs)
+            if settled_J > -math.inf and not tightened:
+                break
+            if tried > LONG_ROUND and not all_near:
+                rest, all_near = None, True
+                _tighten(_near_pairs(ways))
+            rounds, before = rounds - 1, tried
+            _write_legs(table, ways, price)
+            # By what is known of fine arcs: tours that it drops among coarse arcs cost
+            # too much in any case.
+            rest = rest or completions(problem, table, visits)
+            best = max(best, float(rest.before[0]) - visits.surcharge)
+            most, leg = (1.0 + step) * best, _with_joined_arcs(table, joined)
+            found, tried = cheapest_tours(problem, leg, rest, most, work, visits)
+            work -= tried
+            if found is None:
+                return best
+            if found.feasible:
+                best, pairs = max(best, found.cost_J), _pairs_of(ways, found.tours)
+                if best < (1.0 + LEAST_RISE) * settled_J:
+                    break
+                settled_J, step = best, STEP
+            else:
+                best, step = most, 2.0 * step if tried < 2 * before else step
+            if work < 2 * tried:  # the next round takes more
+                return best
     return best
-
-
-def _longer(step: float, labels: int, before: int) -> float:
-    """Return the step after a round without tours.
-
-    It is twice as long while labels are few, or less than twice those of the round
-    before: then much costlier tours are as quickly looked at.
-    """
-    slowly = labels < min(2 * before, LONG_ROUND)
-    return 2.0 * step if slowly or labels < SHORT_ROUND else step
 
 
 def _pairs_of(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> Pairs:
@@ -163,18 +154,21 @@ def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
     return np.concatenate([price * ways.between, start])
 
 
-def _room_for_legs(ways: Sequence[ArcWays], goals: int) -> np.ndarray:
-    """Return a table for what legs cost from arc to arc, shape (R, T + 1, K, T, K).
-
-    Neighbouring arcs count as one where there are many goals or legs.
-    """
-    count = len(ways[0].ways.regions)
-    legs = len(ways) * (count + 1) * count * ARCS**2
-    joined = 1 if goals <= FINE_ARC_GOALS else 2
-    while joined < ARCS and legs > FINE_ARC_LEGS * joined**2:
-        joined *= 2
-    arcs = ARCS // joined
+def _room_for_legs(ways: Sequence[ArcWays]) -> np.ndarray:
+    """Return a table for what legs cost from arc to arc, shape (R, T + 1, K, T, K)."""
+    count, arcs = len(ways[0].ways.regions), ARCS
+    while arcs > 1 and len(ways) * (count + 1) * count * arcs**2 > MOST_LEGS:
+        arcs //= 2
     return np.empty((len(ways), count + 1, arcs, count, arcs))
+
+
+def _with_joined_arcs(leg: np.ndarray, joined: int) -> np.ndarray:
+    """Return what legs cost where so many neighbouring arcs count as one."""
+    robots, nodes, arcs, count, _ = leg.shape
+    joined = min(joined, arcs)
+    parts = arcs // joined, joined
+    own = leg.reshape(robots, nodes, *parts, count, *parts)
+    return np.asarray(own.min(axis=(3, 6)))
 
 
 def _write_legs(leg: np.ndarray, ways: Sequence[ArcWays], price: np.ndarray) -> None:
