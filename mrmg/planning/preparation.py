@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from math import pi
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from mrmg.compilation import (
     note_kernels_are_compiled,
 )
 from mrmg.planning.attempt import Request
+from mrmg.planning.bound.bound import relaxed_routing_J
+from mrmg.planning.bound.relaxation import Relaxation
 from mrmg.planning.bounding import bounds_of
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.parameters import (
@@ -26,12 +29,16 @@ from mrmg.planning.parameters import (
     kernels_of,
     paper_params,
 )
+from mrmg.planning.path_following.coordination._guide_kernels import guide_at
 from mrmg.planning.path_following.coordination.coordination import coordinated
+from mrmg.planning.path_following.coordination.fields import NO_GUIDE
+from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.problem.targets import whole_tours
 from mrmg.planning.routers import find_router
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
@@ -84,11 +91,14 @@ def load_kernels(planner: str, *, every: bool = True) -> None:
 
 
 def coordinate_smallest() -> None:
-    """Search for motions in the smallest mission, along a tour that is known."""
-    _, problem = _smallest_mission()
-    never = np.zeros(1, np.bool_)
-    found = coordinated(problem, [[0]], [no_path(problem, 0)], never)
+    """Search for motions of two robots that change places, one by way of a goal."""
+    problem = state_mission(_smallest_crossing(), 0, SMALL_PARAMS)
+    tours = whole_tours(problem.mission.targets, [[0], []])
+    paths, never = [no_path(problem, r) for r in range(2)], np.zeros(1, np.bool_)
+    # The first round knows no turning.
+    found = coordinated(problem, tours, paths, never, rounds=ROUNDS[1:])
     assert found
+    guide_at(NO_GUIDE, 0, 0, 0.0, 0.0)  # else only where maps are wide
 
 
 def pose_smallest() -> None:
@@ -116,8 +126,9 @@ def load_bounds(objective: Objective) -> None:
 
 
 def bound_smallest() -> None:
-    """Bound the energy and the makespan of the smallest mission."""
+    """Bound the smallest mission: energy, makespan, and energy as of many goals."""
     load_bounds(Objective(energy_weight=1.0, makespan_weight=1.0))
+    relaxed_routing_J(Relaxation.of(_smallest_scene(), cells=50).problem)
 
 
 _CALLS = {
@@ -158,13 +169,42 @@ def _smallest_mission() -> tuple[Scene, Problem]:
 
 @cache
 def _smallest_scene() -> Scene:
-    """Return the smallest mission there is: types do not depend on a scene's size."""
+    """Return the smallest mission there is: types do not depend on a scene's size.
+
+    Its robot has to recharge.
+    """
     document = {
         "format": 1,
         "name": "smallest",
         "bounds": [1, 0, 21, 10],
-        "goals": [{"id": "g", "circle": {"center": [13, 5], "radius": 2}}],
+        "goals": [{"id": "g", "circle": {"center": [18, 5], "radius": 2}}],
+        "stations": [{"id": "s", "circle": {"center": [9, 7], "radius": 1}}],
         "battery": {"capacity_m": 100},
-        "robots": [{"id": "r", "model": "car", "pose": [6, 5, 0]}],
+        "robots": [{"id": "r", "model": "car", "pose": [6, 5, 0], "start_energy": 0.2}],
     }
     return scene_from_document(document, source="smallest mission")
+
+
+def _smallest_crossing() -> Scene:
+    """Return a mission of two robots that want to get past each other."""
+    robots = [
+        {
+            "id": name,
+            "model": "diffdrive",
+            "pose": [start, 2, heading],
+            "finish": {
+                "circle": {"center": [10 - start, 2], "radius": 0.5},
+                "heading": heading,
+            },
+        }
+        for name, start, heading in (("a", 2, 0.0), ("b", 8, pi))
+    ]
+    document = {
+        "format": 1,
+        "name": "crossing",
+        "bounds": [0, 0, 10, 4],
+        "goals": [{"id": "g", "circle": {"center": [5, 2], "radius": 0.5}}],
+        "battery": {"capacity_m": 100},
+        "robots": robots,
+    }
+    return scene_from_document(document, source="smallest crossing")

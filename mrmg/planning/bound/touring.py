@@ -90,8 +90,7 @@ def touring_bound_J(
     for joined in JOINED:
         settled_J, step = -math.inf, STEP
         while rounds > 0 and not halt[0]:
-            tightened = _tighten(pairs)
-            if settled_J > -math.inf and not tightened:
+            if not _tighten(pairs) and settled_J > -math.inf:
                 break
             if tried > LONG_ROUND and not all_near:
                 rest, all_near = None, True

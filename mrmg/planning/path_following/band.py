@@ -133,7 +133,7 @@ def visit_steps(targets: Targets, tour: Sequence[int], state: np.ndarray) -> lis
 
     The list ends before the first target that they do not.
     """
-    state = np.ascontiguousarray(state)
+    state = np.array(state)  # the kernel is compiled for arrays that can be written
     visits: list[int] = []
     step = 0
     for t in tour:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import remainder, tau
 
 import numpy as np
 
@@ -28,8 +29,6 @@ from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
-from mrmg.planning.problem._control_kernels import wrap
-from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import target_depth_m, whole_tours
 from mrmg.planning.roadmap.vertices import planned_regions
@@ -196,7 +195,9 @@ def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None,
         elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
             reason = f"{robot} misses targets of its tour"
             _aim_better(problem, task, drive.motion.state)
-        elif targets.finish[r] in tour and not at_target(targets, tour[-1], end):
+        elif targets.finish[r] in tour and not visit_steps(
+            targets, tour[-1:], end[None]
+        ):
             reason = f"{robot} does not end where its finish requires"
             if not np.isfinite(task.path.aim[-1]):
                 break
@@ -233,7 +234,7 @@ def _aim_better(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
         reached = float(regions[t].depth(at[None, :2])[0])
         if reached < depth_m:
             deeper[i] += depth_m - reached + DEEPER_M
-        off = wrap(float(at[2] - target["heading"][t]))
+        off = remainder(float(at[2] - target["heading"][t]), tau)
         if abs(off) > target["tolerance"][t]:
             aim[i] -= off
     task.path = replace(path, deeper=deeper, aim=aim)

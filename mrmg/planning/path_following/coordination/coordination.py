@@ -149,7 +149,8 @@ class _Planning:
         asked = (r, self.round, yielding, since, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
             begun = motions[r] or self._unmoved[r]
-            self._begun = begun.state[: since + 1]
+            # A copy, as the kernel is compiled for arrays that can be written.
+            self._begun = begun.state[: since + 1].copy()
             self._control[:since] = begun.control[:since]
             found = self._found(r, motions, above, yielding)
             self._answers[asked] = None if found is None else self.kept(r, found)
