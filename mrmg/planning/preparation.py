@@ -40,6 +40,7 @@ from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.problem.targets import whole_tours
 from mrmg.planning.routers import find_router
+from mrmg.planning.routing.routing import RouterParams
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
@@ -63,7 +64,7 @@ def compile_kernels(
     with compiling_alone():
         if kernels_are_compiled(part):
             return
-        compile_in_processes(_CALLS[part], on_progress or (lambda number: None))
+        compile_in_processes(CALLS[part], on_progress or (lambda number: None))
         load_kernels(part)
         bound_smallest()
         with suppress(OSError):  # plan without a cache that can be written
@@ -114,6 +115,14 @@ def follow_smallest() -> None:
     _plan_smallest(SMALL_PARAMS)
 
 
+def route_smallest() -> None:
+    """Find tours of the smallest mission by NRPA, which any planner may ask for."""
+    _, problem = _smallest_mission()
+    params = replace(SMALL_PARAMS, router=RouterParams(method="nrpa"))
+    request = Request(params=params, router=find_router(params.router), seed=0)
+    assert request.tours(problem).feasible
+
+
 def guide_smallest() -> None:
     """Plan the smallest mission by the paper's method."""
     _plan_smallest(SMALL_PAPER_PARAMS)
@@ -131,12 +140,13 @@ def bound_smallest() -> None:
     relaxed_routing_J(Relaxation.of(_smallest_scene(), cells=50).problem)
 
 
-_CALLS = {
+CALLS = {
     PATH_FOLLOWING: (
         coordinate_smallest,
         follow_smallest,
         bound_smallest,
         pose_smallest,
+        route_smallest,
     ),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }

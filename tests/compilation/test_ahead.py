@@ -28,8 +28,8 @@ from mrmg.planning import preparation
 from mrmg.planning.parameters import PATH_FOLLOWING
 from mrmg.scene.populating.populate import populate
 
-preparation.load_kernels(PATH_FOLLOWING)
-preparation.bound_smallest()
+for call in preparation.CALLS[PATH_FOLLOWING]:
+    call()
 
 
 def compiled():
@@ -53,6 +53,7 @@ missions += [field, populate(field, robots=6, goals=70)]
 before = compiled()
 for mission in missions:
     assert mrmg.plan(mission, with_bound=True).plan is not None, mission.name
+mrmg.plan(field, router="nrpa")
 print([name for name, count in compiled().items() if count > before.get(name, 0)])
 """
 
