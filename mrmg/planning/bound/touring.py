@@ -37,8 +37,8 @@ LEAST_RISE = 0.001
 """Share by which a round must raise the bound to be followed by another with the same
 arcs."""
 
-MOST_LEGS = 20_000_000
-"""Legs from arc to arc at most, by their memory (160 MB); where there are more,
+MOST_LEGS = 10_000_000
+"""Legs from arc to arc at most, by their memory (80 MB); where there are more,
 neighbouring arcs always count as one."""
 
 LONG_ROUND = 4_000_000
@@ -163,6 +163,8 @@ def _room_for_legs(ways: Sequence[ArcWays]) -> np.ndarray:
 
 def _with_joined_arcs(leg: np.ndarray, joined: int) -> np.ndarray:
     """Return what legs cost where so many neighbouring arcs count as one."""
+    if joined == 1:
+        return leg
     robots, nodes, arcs, count, _ = leg.shape
     joined = min(joined, arcs)
     parts = arcs // joined, joined

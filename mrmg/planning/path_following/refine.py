@@ -29,6 +29,7 @@ from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
+from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import target_depth_m, whole_tours
 from mrmg.planning.roadmap.vertices import planned_regions
@@ -195,9 +196,7 @@ def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None,
         elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
             reason = f"{robot} misses targets of its tour"
             _aim_better(problem, task, drive.motion.state)
-        elif targets.finish[r] in tour and not visit_steps(
-            targets, tour[-1:], end[None]
-        ):
+        elif targets.finish[r] in tour and not at_target(targets, tour[-1], end):
             reason = f"{robot} does not end where its finish requires"
             if not np.isfinite(task.path.aim[-1]):
                 break
