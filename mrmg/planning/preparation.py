@@ -123,7 +123,8 @@ def route_smallest() -> None:
     _, problem = _smallest_mission()
     params = replace(SMALL_PARAMS, router=RouterParams(method="nrpa"))
     request = Request(params=params, router=find_router(params.router), seed=0)
-    assert request.tours(problem).feasible
+    found = request.tours(problem)
+    assert found.feasible
 
 
 def guide_smallest() -> None:
