@@ -5,7 +5,8 @@ it enters a region to where it leaves it. Here a visit has one place: the arc of
 border where the region is first touched; who touches goals inside a station enters it
 before and leaves it afterwards, which may count as two visits. Only tours whose cost
 can be below some limit are looked at, so the result is the least cost of all tours or
-the limit.
+the limit. Neighbouring arcs count as one at first, at the least of their costs: that
+proves most of it in a hundredth of the work, and leaves fewer rounds of fine arcs.
 """
 
 from __future__ import annotations
@@ -97,8 +98,8 @@ def touring_bound_J(
                 _tighten(_near_pairs(ways))
             rounds, before = rounds - 1, tried
             _write_legs(table, ways, price)
-            # By what is known of fine arcs: tours that it drops among coarse arcs cost
-            # too much in any case.
+            # Bounds of the rest by fine arcs serve coarse ones: what they drop among
+            # these costs too much by fine arcs, which is what counts.
             rest = rest or completions(problem, table, visits)
             best = max(best, float(rest.before[0]) - visits.surcharge)
             most, leg = (1.0 + step) * best, _with_joined_arcs(table, joined)
