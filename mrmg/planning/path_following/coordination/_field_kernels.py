@@ -112,17 +112,17 @@ def turning_cost_to_go(price, turn_s, back, cost):
 
 
 @kernel
-def timed_cost_to_go(price, seed, penalty, hold, field):
+def timed_cost_to_go(price, penalty, hold, field):
     """Fill in the costs-to-go of all layers of time but the last one, latest first.
 
     In the time of a layer a point robot moves to a cell beside its own, or holds.
 
     Args:
         price: cost of a cell's side, inf where it may not be passed, shape (ny, nx).
-        seed: cost from a cell on where the way may end, else inf, (T, ny, nx).
         penalty: cost of being in a cell, inf where other robots are, (T, ny, nx).
         hold: cost of holding for the time of a layer, shape (ny, nx).
-        field: receives the costs; the last layer is there, shape (T, ny, nx).
+        field: cost from a cell on where the way may end, else inf; receives the
+            costs-to-go; those of the last layer are there, shape (T, ny, nx).
     """
     rows, columns = price.shape
     # Borders spare the loops all branches, so that several cells are reckoned at once.
@@ -142,7 +142,7 @@ def timed_cost_to_go(price, seed, penalty, hold, field):
                 corners = min(across[i, j], across[i, j + 2])
                 corners = min(corners, across[i + 2, j], across[i + 2, j + 2])
                 best = min(half + sides, DIAGONAL * half + corners)
-                best = min(best, seed[t, i, j], hold[i, j] + field[t + 1, i, j])
+                best = min(best, field[t, i, j], hold[i, j] + field[t + 1, i, j])
                 field[t, i, j] = penalty[t, i, j] + (best if half < np.inf else half)
 
 
@@ -206,37 +206,50 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
         soft_s: cost of a layer in conflict with a robot of lower priority.
         penalty: of cells, shape (T, ny, nx).
     """
-    rows, columns = penalty.shape[1], penalty.shape[2]
+    layers, rows, columns = penalty.shape
     x_min, y_min, cell = grid
     corner = np.empty((MOST_CORNERS, 2))
     for other in range(len(traffic.robot)):
-        if not (traffic.robot[other].hard or traffic.robot[other].soft):
+        hard = traffic.robot[other].hard
+        if not (hard or traffic.robot[other].soft):
             continue
         it = traffic.fleet[other]
         outline, placed = it.corner[: it.corners], corner[: it.corners]
         near = inner + max(own[0].spacing, it.spacing) - 0.5 * cell
         reach = own[0].radius + it.radius
         far = near + it.radius
-        for t in range(len(penalty)):
+        t = 0
+        while t < layers:
             k = min(t * layer, traffic.robot[other].last)
+            stands = k == traffic.robot[other].last
+            after = layers if stands else t + 1  # layers that look alike
             pose, middle = traffic.pose[other, k], traffic.middle[other, k]
             place_turned(outline, pose[0], pose[1], pose[3], pose[4], placed)
             first_row = max(0, int(floor((middle[1] - far - y_min) / cell)))
             last_row = min(rows - 1, int(floor((middle[1] + far - y_min) / cell)))
-            first = max(0, int(floor((middle[0] - far - x_min) / cell)))
-            last = min(columns - 1, int(floor((middle[0] + far - x_min) / cell)))
             for i in range(first_row, last_row + 1):
-                for j in range(first, last + 1):
-                    x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
-                    apart = point_distance(x, y, middle[0], middle[1])
-                    if apart >= far or penalty[t, i, j] == np.inf:
-                        continue
-                    if not point_convex_distance(x, y, placed) < near:
-                        continue
-                    if traffic.robot[other].hard:
-                        penalty[t, i, j] = np.inf
-                    else:
-                        penalty[t, i, j] += soft_s * max(0.0, 1.0 - apart / reach)
+                y = y_min + (i + 0.5) * cell
+                half = sqrt(max(0.0, far * far - (y - middle[1]) ** 2))
+                a = max(0, int(floor((middle[0] - half - x_min) / cell)))
+                b = min(columns - 1, int(floor((middle[0] + half - x_min) / cell)))
+                # The footprint is convex: cells between the outermost near it are, too.
+                while a <= b and not (
+                    point_convex_distance(x_min + (a + 0.5) * cell, y, placed) < near
+                ):
+                    a += 1
+                while b > a and not (
+                    point_convex_distance(x_min + (b + 0.5) * cell, y, placed) < near
+                ):
+                    b -= 1
+                for u in range(t, after):
+                    for j in range(a, b + 1):
+                        if hard:
+                            penalty[u, i, j] = np.inf
+                            continue
+                        x = x_min + (j + 0.5) * cell
+                        apart = point_distance(x, y, middle[0], middle[1])
+                        penalty[u, i, j] += soft_s * max(0.0, 1.0 - apart / reach)
+            t = after
 
 
 @kernel

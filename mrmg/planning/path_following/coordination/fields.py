@@ -142,18 +142,18 @@ class Fields:
         for i in range(len(targets) - 1, -1, -1):
             region = self._region(targets[i : i + 1])
             hold = np.full(price.shape, standing)
-            seed = np.full(penalty.shape, np.inf)
+            field[i] = np.inf
             last = np.where(region, 0.0, np.inf)
             if stood[i] >= 0:
                 ahead = np.minimum(np.arange(layers) + stood[i], layers - 1)
                 through = i + 1 == len(targets)
-                seed[:, region] = 0.0 if through else field[i + 1, ahead][:, region]
-                last = seed[-1]
+                field[i][:, region] = 0.0 if through else field[i + 1, ahead][:, region]
+                last = field[i, -1]
             else:
                 hold[region] = 0.0
             last = np.where(lasting < np.inf, last, np.inf)
             field[i, -1] = _field_kernels.cost_to_go(lasting, last)
-            _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field[i])
+            _field_kernels.timed_cost_to_go(price, penalty, hold, field[i])
         way = self._problem.start[r : r + 1, :2]
         if own[0]["model"] != CAR:
             way = self._way_down(r, targets, stood, (price, standing, field))
