@@ -336,7 +336,8 @@ def test_ways_that_cannot_be_driven_are_smoothed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Smoothing helps a car that steers slowly where stops do not."""
-    scene = with_steering_rate(hall(*OPPOSITE), 0.3)
+    scene = hall(*OPPOSITE[::-1], pose=(3.0, 2.0, pi))
+    scene = with_steering_rate(scene, 0.25)
     monkeypatch.setattr(poses, "JUMP_SHARE", np.inf)
     problem, tour = stated(scene)
     task = posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
