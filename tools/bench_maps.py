@@ -40,7 +40,7 @@ def main() -> int:
     if missing:
         print(f"no map {', '.join(missing)}; name others", file=sys.stderr)
         return 2
-    mission = f"{options.robots} robots, {options.goals} goals"
+    mission = f"{options.robots} robots ({options.model}), {options.goals} goals"
     mission += f", placement {options.placement}, idle power {options.idle_power:g} W"
     mission += ", back to the start" if options.finish_at_start else ""
     print(f"{__doc__}\n{mission}\n\n{bench.protocol(options)}")
@@ -54,6 +54,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("maps", nargs="*", type=Path, metavar="MAP", default=NARROW)
     parser.add_argument("--robots", type=int, default=4, help="default 4")
     parser.add_argument("--goals", type=int, default=20, help="default 20")
+    parser.add_argument("--model", default="car", help="of the robots, default car")
     parser.add_argument("--placement", type=int, default=3, help="its seed, default 3")
     power = {"type": float, "default": 0.0, "metavar": "W"}
     more = "of each robot, default 0; batteries hold what it takes on the way, too"
@@ -72,6 +73,7 @@ def populated(path: Path, options: argparse.Namespace) -> Scene:
             robots=options.robots,
             goals=options.goals,
             seed=options.placement,
+            model=options.model,
         )
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error

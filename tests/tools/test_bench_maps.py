@@ -50,6 +50,17 @@ def test_robots_may_have_to_end_where_they_start(
                 assert robot.finish.region.depth(np.array([robot.pose[:2]])) > 0.0
 
 
+def test_robots_may_be_of_any_model(
+    hall: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = [str(hall), "--robots", "1", "--goals", "2"]
+    for more, name in (([], "car"), (["--model", "diffdrive"], "diffdrive")):
+        monkeypatch.setattr(sys, "argv", ["bench", *options, *more])
+        (robot,) = bench_maps.populated(hall, bench_maps.parse_options()).robots
+        assert robot.model.origin is not None
+        assert robot.model.origin.reference == name
+
+
 def test_a_map_that_is_not_there_is_named(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
