@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from solved import verified_plan
 
@@ -54,6 +55,16 @@ def test_their_paths_do_not_change_gear(
         for each in (scene, forwards(scene))
     ]
     assert gears == [{1, -1}, {1}]
+
+
+def test_others_come_back_without_turning(yard: Callable[..., Scene]) -> None:
+    """Robots that turn on the spot do not, where to drive backwards spares it."""
+    robots = [{"id": "r1", "model": "husky", "pose": [4, 10, 0], "finish": "start"}]
+    scene = yard(robots=robots)
+    state = verified_plan(scene, 0, PARAMS).trajectories[0].state
+    assert np.abs(np.diff(state[:, 2])).sum() < 0.3
+    forward_state = forward_plan_of(scene).trajectories[0].state
+    assert np.abs(np.diff(forward_state[:, 2])).sum() > 2.5
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive"])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import cos, sin
+from math import atan2, cos, isnan, nan, remainder, sin, tau
 
 import numpy as np
 
@@ -112,20 +112,33 @@ class Path:
         )
 
 
+def directions_of(path: Path) -> list[tuple[int, float, float]]:
+    """Return how a path leads to its start and its stops, and on from them, in order.
+
+    Each as (node, direction before, direction ahead) [rad]; before the start that is
+    the robot's heading, after the end there is none (NaN).
+    """
+    way, found = path.way, []
+    for node in dict.fromkeys([0, *path.stop.tolist()]):
+        near = path.points(way[node] + DIRECTION_M * np.array([-1.0, 1.0]))
+        before, ahead = path.node[node] - near[0], near[1] - path.node[node]
+        found.append(
+            (
+                node,
+                atan2(before[1], before[0]) if node > 0 else path.heading,
+                atan2(ahead[1], ahead[0]) if node < len(way) - 1 else nan,
+            )
+        )
+    return found
+
+
 def turns_of(path: Path) -> list[tuple[int, float]]:
     """Return how much a path turns at its start and at its stops, in order [rad]."""
-    way, turns = path.way, []
-    for node in dict.fromkeys([0, *path.stop.tolist()]):
-        if node == len(way) - 1:
-            break
-        near = path.points(way[node] + DIRECTION_M * np.array([-1.0, 1.0]))
-        ahead = near[1] - path.node[node]
-        before = np.array([cos(path.heading), sin(path.heading)])
-        if node > 0:
-            before = path.node[node] - near[0]
-        turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
-        turns.append((node, abs(float(turn))))
-    return turns
+    return [
+        (node, abs(remainder(ahead - before, tau)))
+        for node, before, ahead in directions_of(path)
+        if not isnan(ahead)
+    ]
 
 
 def visit_steps(targets: Targets, tour: Sequence[int], state: np.ndarray) -> list[int]:

@@ -44,17 +44,11 @@ def _cost_map(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
     length = (high[0] - low[0]) / pieces
     limit, margin_m = robot["limit"], (1.0 + ROOM_SHARE) * float(robot["margin"])
     if robot["model"] == UNICYCLE:
-        arm = float(robot["track"])
-        # A radian takes as long as so much way, for which the robot slows down.
-        turning_m = limit[1] / limit[2]
         rate = 4.0 * limit[4] / limit[1] ** 2
         turning_room_m = model.circumscribed_radius_m + margin_m
     else:
-        arm, turning_m = float(robot["wheelbase"]), 0.0
-        rate = limit[4] / (arm * limit[1])
+        rate = limit[4] / (float(robot["wheelbase"]) * limit[1])
         turning_room_m = 0.0
-    energy = model.energy_model
-    scrub = arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9)
     share = energy_share(problem.preference.driving, problem.scene.robots[r])
     return CostMap(
         x_min=spaces.x_min,
@@ -68,8 +62,21 @@ def _cost_map(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         turning_room=turning_room_m,
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
-        scrub=float(share * scrub + (1.0 - share) * turning_m),
+        scrub=radian_m(problem, r),
     )
+
+
+def radian_m(problem: Problem, r: int) -> float:
+    """Return what turning by one radian is worth to robot r [m of plain ground]."""
+    robot, limit = problem.mission.fleet[r], problem.mission.fleet[r]["limit"]
+    energy = problem.scene.robots[r].model.energy_model
+    arm_m, turning_m = float(robot["wheelbase"]), 0.0
+    if robot["model"] == UNICYCLE:
+        # A radian takes as long as so much way, for which the robot slows down.
+        arm_m, turning_m = float(robot["track"]), limit[1] / limit[2]
+    scrub_m = arm_m * energy.turning_force_N / max(energy.rolling_force_N, 1e-9)
+    share = energy_share(problem.preference.driving, problem.scene.robots[r])
+    return float(share * scrub_m + (1.0 - share) * turning_m)
 
 
 def path_curvature(robot: np.ndarray) -> float:

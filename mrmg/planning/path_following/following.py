@@ -10,7 +10,7 @@ Where robots get in each other's way, a search for motions starts from the paths
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import radians
 
 import numpy as np
@@ -30,7 +30,7 @@ from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.driven_legs import Driven, what_driving_took
-from mrmg.planning.path_following.gears import with_best_gears
+from mrmg.planning.path_following.gears import with_best_gears, with_least_turning
 from mrmg.planning.path_following.refine import drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
@@ -44,9 +44,6 @@ SHARP = radians(110.0)
 
 REVERSE_SPEED_SHARE = 0.9
 """Share of its speed forwards from which on a car is as fast backwards."""
-
-PIVOT = radians(60.0)
-"""Turn from which on a robot that can turns on the spot [rad]."""
 
 LEAST_SOC_MARGIN = 0.02
 """Share of a battery's capacity that plans always leave above its reserve: a robot may
@@ -143,7 +140,8 @@ def tour_path(
     """Return the way of the roadmap along robot r's tour.
 
     A car that can changes gear at a target where its way turns sharply, but not where
-    time counts and it is slower backwards; a robot that can turns on the spot there.
+    time counts and it is slower backwards; a robot that turns on the spot has the gears
+    in which it turns least.
 
     Args:
         problem: the mission.
@@ -167,13 +165,11 @@ def tour_path(
         pause_s=np.zeros(len(tour)),
         aim=problem.aims(r, tour),
     )
-    turns = turns_of(path)
-    backwards, forwards = np.abs(problem.mission.fleet[r]["limit"][:2])
     if problem.mission.fleet[r]["model"] == UNICYCLE:
-        pivots = [at for at, turn in turns if turn > PIVOT]
-        return replace(path, pivot=np.array(pivots, np.int64))
+        return with_least_turning(problem, r, path)
+    backwards, forwards = np.abs(problem.mission.fleet[r]["limit"][:2])
     least = REVERSE_SPEED_SHARE * forwards if timed else 0.0
-    for at, turn in turns:
+    for at, turn in turns_of(path):
         if turn > SHARP and backwards > 0.0 and backwards >= least:
             path.gear[at:] *= -1
     return path

@@ -1,11 +1,14 @@
-"""Gears of paths: the cheaper way round at every turn that leaves it open."""
+"""Gears of paths: the cheaper way round at every turn that leaves it open.
+
+Those of robots that turn on the spot are compared with all that there are.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import product
-from math import cos, radians, sin
+from itertools import pairwise, product
+from math import atan2, cos, pi, radians, remainder, sin, tau
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from mrmg.planning.path_following.cost_map import cost_maps_of
 from mrmg.planning.path_following.following import tour_path
 from mrmg.planning.path_following.gears import WORTH_M_S, with_best_gears
 from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.problem.time_weighting import energy_share
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=300)
@@ -79,3 +83,73 @@ def test_of_gears_that_cost_the_same_the_faster_ones_count(
     halves = np.where(np.arange(len(path.gear)) < path.stop[0], 1, -1)
     found = geared(problem, replace(path, gear=halves), [(int(path.stop[0]), doubtful)])
     assert set(found.gear) == {1}
+
+
+PLACES = np.array([[6.0, 4.0], [24.0, 5.0], [23.0, 16.0], [7.0, 15.0], [15.0, 10.0]])
+"""Corners of the yard and its middle: ways between them are straight, and longer than
+what directions are read over."""
+
+
+def turner_mission(
+    yard: Callable[..., Scene], seed: int, objective: str
+) -> tuple[Scene, list[int]]:
+    """Return a yard with a robot that turns on the spot, and a tour, both drawn.
+
+    Every second place wants a heading, the robot's finish one of them.
+    """
+    rng = np.random.default_rng(seed)
+    places = rng.permutation(PLACES)
+    wanted = rng.uniform(-pi, pi, len(places)).round(3).tolist()
+    goals = [
+        {"id": f"g{i}", "circle": {"center": place, "radius": 0.3}}
+        for i, place in enumerate(places[1:4].tolist())
+    ]
+    goals[1]["heading"] = wanted[1]
+    finish = {"circle": {"center": places[4].tolist(), "radius": 0.3}}
+    if seed % 2:
+        finish["heading"] = wanted[4]
+    robot = {"id": "r1", "pose": [*places[0].tolist(), wanted[0]], "finish": finish}
+    model = {"like": "diffdrive", "limits": {"v_min": -0.8 if seed % 3 else -1.6}}
+    scene = yard(goals=goals, robots=[{**robot, "model": model}], objective=objective)
+    return scene, rng.permutation(3).tolist()
+
+
+def turner_cost_m(
+    problem: Problem, stops: np.ndarray, tour: list[int], gears: tuple[int, ...]
+) -> float:
+    """Return what turning on straight legs costs, and the time that they take."""
+    scene, limit = problem.scene, problem.mission.fleet[0]["limit"]
+    target = problem.mission.targets.target
+    legs = np.diff(stops, axis=0)
+    noses = [float(problem.start[0, 2])]
+    for leg, gear, number in zip(legs, gears, tour, strict=True):
+        direction = atan2(*(gear * leg[::-1]))
+        noses += [direction, direction]
+        if target["tolerance"][number] < pi:
+            noses.append(float(target["heading"][number]))
+    turned = sum(abs(remainder(b - a, tau)) for a, b in pairwise(noses))
+    back, ahead = abs(limit[0]), limit[1]
+    share = energy_share(problem.preference.driving, scene.robots[0])
+    slower = np.where(np.array(gears) > 0, 0.0, 1.0 / back - 1.0 / ahead)
+    lost_s = float((np.hypot(*legs.T) * slower).sum())
+    worth_m = (WORTH_M_S + (1.0 - share) * ahead) * lost_s
+    return float(cost_maps_of(problem)[0].scrub * turned + worth_m)
+
+
+@pytest.mark.parametrize("objective", ["energy", "makespan"])
+@pytest.mark.parametrize("seed", range(12))
+def test_robots_that_turn_on_the_spot_turn_as_little_as_they_can(
+    yard: Callable[..., Scene], state: Callable[..., Problem], seed: int, objective: str
+) -> None:
+    scene, tour = turner_mission(yard, seed, objective)
+    problem = state(scene, samples=0)
+    tour.append(int(problem.mission.targets.finish[0]))
+    path = tour_path(problem, 0, tour)
+    stops = path.node[[0, *path.stop]]
+    found = [int(path.gear[at - 1]) for at in path.stop]
+    costs_m = {
+        gears: turner_cost_m(problem, stops, tour, gears)
+        for gears in product((1, -1), repeat=len(tour))
+    }
+    assert costs_m[tuple(found)] == pytest.approx(min(costs_m.values()))
+    assert max(costs_m.values()) > min(costs_m.values())
