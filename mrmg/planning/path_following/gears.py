@@ -81,9 +81,8 @@ def with_least_turning(problem: Problem, r: int, path: Path) -> Path:
     nodes, before, ahead = zip(*directions_of(path), strict=True)
     backwards, forwards = np.abs(problem.mission.fleet[r]["limit"][:2])
     share = energy_share(problem.preference.driving, problem.scene.robots[r])
+    share = 0.0 if problem.minimum_time else share
     worth_m_s = WORTH_M_S + forwards * (1.0 - share)
-    if problem.minimum_time:
-        worth_m_s = WORTH_M_S + forwards
     price = {1: 0.0}
     if backwards > 0.0:
         price[-1] = worth_m_s * (1.0 / backwards - 1.0 / forwards)

@@ -130,19 +130,26 @@ def turner_cost_m(
     turned = sum(abs(remainder(b - a, tau)) for a, b in pairwise(noses))
     back, ahead = abs(limit[0]), limit[1]
     share = energy_share(problem.preference.driving, scene.robots[0])
+    share = 0.0 if problem.minimum_time else share
     slower = np.where(np.array(gears) > 0, 0.0, 1.0 / back - 1.0 / ahead)
     lost_s = float((np.hypot(*legs.T) * slower).sum())
     worth_m = (WORTH_M_S + (1.0 - share) * ahead) * lost_s
     return float(cost_maps_of(problem)[0].scrub * turned + worth_m)
 
 
-@pytest.mark.parametrize("objective", ["energy", "makespan"])
+@pytest.mark.parametrize(
+    ("objective", "late"), [("energy", False), ("energy", True), ("makespan", False)]
+)
 @pytest.mark.parametrize("seed", range(12))
 def test_robots_that_turn_on_the_spot_turn_as_little_as_they_can(
-    yard: Callable[..., Scene], state: Callable[..., Problem], seed: int, objective: str
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    seed: int,
+    objective: str,
+    late: bool,
 ) -> None:
     scene, tour = turner_mission(yard, seed, objective)
-    problem = state(scene, samples=0)
+    problem = replace(state(scene, samples=0), minimum_time=late)
     tour.append(int(problem.mission.targets.finish[0]))
     path = tour_path(problem, 0, tour)
     stops = path.node[[0, *path.stop]]

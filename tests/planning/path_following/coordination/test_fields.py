@@ -8,6 +8,8 @@ from math import cos, hypot, inf, pi, sin
 import networkx as nx
 import numpy as np
 import pytest
+import shapely
+from shapely import affinity
 
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination import _field_kernels, _guide_kernels
@@ -18,6 +20,7 @@ from mrmg.planning.path_following.coordination.fields import (
     Fields,
 )
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
+from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
@@ -146,6 +149,48 @@ def test_joined_cells_lead_through_an_opening(yard: Callable[..., Scene]) -> Non
         for one in (fields, joined)
     )
     assert joined_s == pytest.approx(fine_s, rel=0.1)
+
+
+def test_costs_to_go_in_time_keep_out_of_where_others_are(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Against shapely: of a hauler that turns and then stands for good."""
+    fleet = {"r1": ("car", [4, 16, 0]), "r2": ("hauler", [10, 9, 0.3])}
+    scene = yard(
+        robots=[
+            {"id": name, "model": model, "pose": pose}
+            for name, (model, pose) in fleet.items()
+        ]
+    )
+    problem = state(scene, samples=50)
+    steps = np.linspace(0.0, 1.0, 60)[:, None]
+    drive = np.array([10.0, 9.0, 0.3, 0.0, 0.0]) + steps * [6.0, 3.5, 0.9, 0.0, 0.0]
+    motions = [None, Motion(drive, np.zeros((len(drive) - 1, 2)))]
+    traffic = FleetTraffic(problem, 200).around(0, motions, np.array([False, True]))
+    traffic = traffic._replace(end=200)
+    fields = Fields(problem)
+    free = np.isfinite(fields.static(0, [0]).field[0, 0])
+    guide, _ = fields.timed(0, [0], np.zeros(1, int), traffic, (0.3, 1.0))
+    own, other = problem.mission.fleet
+    model = scene.robots[0].model
+    near_m = model.inscribed_radius_m + max(own["spacing"], other["spacing"])
+    near_m -= 0.5 * guide.cell
+    _, layers, rows, columns = guide.field.shape
+    y, x = (guide.cell * (np.mgrid[:rows, :columns] + 0.5)) + [
+        [[guide.y_min]],
+        [[guide.x_min]],
+    ]
+    footprint = shapely.Polygon(scene.robots[1].model.footprint_m)
+    for t in range(layers):
+        px, py, theta = drive[min(t * guide.layer, len(drive) - 1), :3]
+        turned = affinity.rotate(footprint, theta, origin=(0, 0), use_radians=True)
+        placed = affinity.translate(turned, px, py)
+        apart_m = shapely.distance(placed, shapely.points(x, y))
+        assert np.isinf(guide.field[0, t][apart_m < near_m - 1e-6]).all()
+        if t * guide.layer >= len(drive) - 1:
+            beside = free & (apart_m > near_m + 1e-6)
+            assert np.isfinite(guide.field[0, t][beside]).all()
+    assert layers * guide.layer > 2 * len(drive)
 
 
 @pytest.mark.parametrize("leg", [0, 1, 7])
