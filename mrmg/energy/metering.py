@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -247,16 +248,30 @@ def battery_content(
             inside = regions[visit.target].depth(motion.state[span, :2]) >= 0.0
             there_s = np.diff(motion.time_s[span]) * (inside[:-1] & inside[1:])
             gains_J[visit.step : end] += battery.charging_power_W * there_s
-    before, after = [], []
-    content_J = battery.start_J
-    for step, gain_J in enumerate([*gains_J.tolist(), 0.0]):
-        content_J = reckoned_J.get(step, content_J)
-        before.append(content_J)
-        if step in full_at:
-            content_J = battery.capacity_J
-        after.append(content_J)
-        content_J = min(content_J + gain_J, battery.capacity_J)
-    return np.array(after), [before[visit.step] for visit in visits]
+    content_J = np.empty(len(draw_J) + 1)
+    arrival_J: dict[int, float] = {}
+    begun_J = battery.start_J
+    starts = sorted({0, *full_at, *reckoned_J})
+    for start, end in pairwise([*starts, len(draw_J)]):
+        arrival_J[start] = reckoned_J.get(start, begun_J)
+        begun_J = battery.capacity_J if start in full_at else arrival_J[start]
+        held_J = _held(begun_J, gains_J[start:end], battery.capacity_J)
+        content_J[start : end + 1] = held_J
+        begun_J = float(held_J[-1])
+    arrivals_J = [
+        arrival_J.get(visit.step, float(content_J[visit.step])) for visit in visits
+    ]
+    return content_J, arrivals_J
+
+
+def _held(begun_J: float, gain_J: np.ndarray, capacity_J: float) -> np.ndarray:
+    """Return what a battery holds at first and after each gain; no more goes in."""
+    held_J = np.cumsum(np.append(begun_J, gain_J))
+    if held_J.max() <= capacity_J:
+        return held_J
+    gains_J, limit = gain_J.tolist(), capacity_J
+    limited = accumulate(gains_J, lambda a, b: min(a + b, limit), initial=begun_J)
+    return np.array(list(limited))
 
 
 def own_visits(motion: Motion, visits: Iterable[Visit]) -> list[Visit]:

@@ -64,14 +64,16 @@ def _narrow(
     bounds = shapely.box(*scene.bounds).boundary
     near = [bounds, *(item.shape for item in scene.barriers if item.stops(robot.id))]
     tree = shapely.STRtree(near)
-    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state))
     least_m = margin_m - ROUNDING_M
-    less = np.unique(tree.query(bodies, predicate="dwithin", distance=least_m)[0])
+    within_m = robot.model.circumscribed_radius_m + least_m
+    places = shapely.points(trajectory.state[:, :2])
+    close = np.unique(tree.query(places, predicate="dwithin", distance=within_m)[0])
+    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state[close]))
     found, distance = tree.query_nearest(
-        bodies[less], return_distance=True, all_matches=False
+        bodies, return_distance=True, all_matches=False
     )
-    distance_m = np.full(len(bodies), np.inf)
-    distance_m[less[found[0]]] = distance
+    distance_m = np.full(len(places), np.inf)
+    distance_m[close[found[0]]] = distance
     for first, end in runs(distance_m < least_m):
         tightest = first + int(distance_m[first:end].argmin())
         x_m, y_m = trajectory.state[tightest, :2].tolist()

@@ -20,6 +20,7 @@ from mrmg.energy.metering import (
     step_energy_parts,
 )
 from mrmg.energy.model import PARTS
+from mrmg.plans import Visit
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
@@ -281,6 +282,37 @@ def test_battery_never_holds_more_than_its_capacity(scene: Scene) -> None:
     still = TimedStates(robot="r", time_s=np.arange(4.0), state=np.zeros((4, 5)))
     content_J, _ = battery_content(scene, still, np.array([-50.0, 20.0, -50.0]), [])
     assert content_J.tolist() == [30000.0, 30000.0, 29980.0, 30000.0]
+
+
+DRAWS_J = st.floats(-3000.0, 3000.0)
+
+
+@given(
+    st.lists(DRAWS_J, min_size=1, max_size=40),
+    st.dictionaries(st.integers(0, 40), st.floats(0.0, 30000.0), max_size=3),
+    st.sets(st.integers(0, 40), max_size=3),
+)
+def test_battery_is_reckoned_step_by_step(
+    draws_J: list[float], reckoned_J: dict[int, float], stops: set[int]
+) -> None:
+    scene, n = make_scene(), len(draws_J)
+    reckoned_J = {step: held_J for step, held_J in reckoned_J.items() if step <= n}
+    stops = {step for step in stops if step <= n}
+    motion = TimedStates(
+        robot="r", time_s=np.arange(n + 1.0), state=np.zeros((n + 1, 5))
+    )
+    visits = [Visit("r", "s", "station", at, float(at), 0.0) for at in sorted(stops)]
+    found = battery_content(scene, motion, np.array(draws_J), visits, reckoned_J)
+    content_J, arrival_J, held_J = [], [], 30000.0
+    for step, draw_J in enumerate([*draws_J, 0.0]):
+        held_J = reckoned_J.get(step, held_J)
+        if step in stops:
+            arrival_J.append(held_J)
+            held_J = 30000.0
+        content_J.append(held_J)
+        held_J = min(held_J - draw_J, 30000.0)
+    assert found[0].tolist() == content_J
+    assert found[1] == arrival_J
 
 
 def test_visits_of_other_robots_do_not_recharge() -> None:

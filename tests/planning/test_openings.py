@@ -91,6 +91,22 @@ def test_gap_little_wider_than_the_robot(
     assert verdict.min_obstacle_clearance_m > 0.3 * least_m
 
 
+@pytest.mark.parametrize("model", ["car", "hauler"])
+def test_every_state_with_less_than_the_margin_is_stated(model: str) -> None:
+    scene = gap({"car": 1.25, "hauler": 1.55}[model], model)
+    plan = planned(scene)
+    walls = [shapely.box(*scene.bounds).boundary, *(o.shape for o in scene.obstacles)]
+    (way,) = plan.trajectories
+    bodies = shapely.polygons(scene.robots[0].model.footprint_at(way.state))
+    clearance_m = shapely.distance(bodies, shapely.union_all(walls))
+    stated = np.zeros(len(bodies), np.bool_)
+    for passage in plan.narrow:
+        first, last = (round(s / way.dt_s) for s in (passage.start_s, passage.end_s))
+        stated[first : last + 1] = True
+        assert passage.margin_m == pytest.approx(clearance_m[first : last + 1].min())
+    np.testing.assert_array_equal(stated, clearance_m < plan.margins["r1"][0] - 1e-7)
+
+
 def test_wide_gaps_keep_the_margin() -> None:
     scene = gap(2.2)
     plan = planned(scene)
