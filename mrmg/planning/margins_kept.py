@@ -17,6 +17,9 @@ from mrmg.scene.types import Robot, Scene
 ROUNDING_M = 1e-7
 """Distance that a margin may be missed by for rounding alone [m]."""
 
+STRETCH = 50
+"""States that are looked at one by one only if their box is near an obstacle."""
+
 
 def with_least_spacing(scene: Scene, margins: Margins) -> Scene:
     """Return a scene whose robots keep no more from each other than both may stray.
@@ -62,18 +65,23 @@ def _narrow(
 ) -> Iterator[NarrowPassage]:
     """Yield the stretches on which a robot keeps less than its margin."""
     bounds = shapely.box(*scene.bounds).boundary
-    near = [bounds, *(item.shape for item in scene.barriers if item.stops(robot.id))]
-    tree = shapely.STRtree(near)
+    shapes = [item.shape for item in scene.barriers if item.stops(robot.id)]
+    tree = shapely.STRtree([bounds, *shapes])
     least_m = margin_m - ROUNDING_M
     within_m = robot.model.circumscribed_radius_m + least_m
-    places = shapely.points(trajectory.state[:, :2])
-    close = np.unique(tree.query(places, predicate="dwithin", distance=within_m)[0])
+    place, n = trajectory.state[:, :2], len(trajectory.state)
+    first = np.arange(0, n, STRETCH)
+    low = np.minimum.reduceat(place, first) - within_m
+    high = np.maximum.reduceat(place, first) + within_m
+    near = tree.query(shapely.box(*low.T, *high.T), predicate="intersects")[0]
+    close = np.flatnonzero(np.isin(np.arange(n) // STRETCH, near))
     bodies = shapely.polygons(robot.model.footprint_at(trajectory.state[close]))
+    less = np.unique(tree.query(bodies, predicate="dwithin", distance=least_m)[0])
     found, distance = tree.query_nearest(
-        bodies, return_distance=True, all_matches=False
+        bodies[less], return_distance=True, all_matches=False
     )
-    distance_m = np.full(len(places), np.inf)
-    distance_m[close[found[0]]] = distance
+    distance_m = np.full(n, np.inf)
+    distance_m[close[less[found[0]]]] = distance
     for first, end in runs(distance_m < least_m):
         tightest = first + int(distance_m[first:end].argmin())
         x_m, y_m = trajectory.state[tightest, :2].tolist()

@@ -16,10 +16,16 @@ import mrmg
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.frame import Frame
+from mrmg.planning.margins_kept import with_margins
 from mrmg.planning.problem.problem import state_mission
-from mrmg.plans import Plan, PlanStatus
+from mrmg.plans import Plan, PlanStatus, Trajectory
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.margins import certified_minimum_m, default_margins, kept_margins
+from mrmg.scene.margins import (
+    Margins,
+    certified_minimum_m,
+    default_margins,
+    kept_margins,
+)
 from mrmg.scene.types import Scene
 from mrmg.verification.verify import verify
 
@@ -91,20 +97,28 @@ def test_gap_little_wider_than_the_robot(
     assert verdict.min_obstacle_clearance_m > 0.3 * least_m
 
 
-@pytest.mark.parametrize("model", ["car", "hauler"])
-def test_every_state_with_less_than_the_margin_is_stated(model: str) -> None:
-    scene = gap({"car": 1.25, "hauler": 1.55}[model], model)
-    plan = planned(scene)
+@pytest.mark.parametrize("margin_m", [0.1, 0.4, 1.5])
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+def test_every_state_with_less_than_the_margin_is_stated(
+    model: str, margin_m: float
+) -> None:
+    # Through the gap, with a long stay beside the wall.
+    scene = gap(2.0, model)
+    x_m = np.interp(np.arange(300), [0, 90, 210, 299], [3.0, 12.5, 12.5, 20.0])
+    state = np.column_stack([x_m, np.full(300, 7.0), np.zeros((300, 3))])
+    control = np.zeros((299, 2))
+    way = Trajectory(robot="r1", dt_s=0.1, state=state, control=control)
+    empty = replace(planned(gap(2.0)), trajectories=(way,))
+    plan = with_margins(scene, empty, Margins(obstacle_m=margin_m, robot_m=0.1))
     walls = [shapely.box(*scene.bounds).boundary, *(o.shape for o in scene.obstacles)]
-    (way,) = plan.trajectories
-    bodies = shapely.polygons(scene.robots[0].model.footprint_at(way.state))
+    bodies = shapely.polygons(scene.robots[0].model.footprint_at(state))
     clearance_m = shapely.distance(bodies, shapely.union_all(walls))
     stated = np.zeros(len(bodies), np.bool_)
     for passage in plan.narrow:
         first, last = (round(s / way.dt_s) for s in (passage.start_s, passage.end_s))
         stated[first : last + 1] = True
         assert passage.margin_m == pytest.approx(clearance_m[first : last + 1].min())
-    np.testing.assert_array_equal(stated, clearance_m < plan.margins["r1"][0] - 1e-7)
+    np.testing.assert_array_equal(stated, clearance_m < margin_m - 1e-7)
 
 
 def test_wide_gaps_keep_the_margin() -> None:
