@@ -9,12 +9,11 @@ cover 12 % of it, however many there are, and stations grow with the goals, one 
 4. Large fleets (16 robots with 64 goals and 20 stations, 32 with 128 and 40) are placed
 on the map of scene6, 100 x 100 m as well. In the series `fleets` all grows together: 4
 goals and a station for each robot, ground and boxes with them (50 boxes on 100 x 100 m
-for 16 robots); 64, 128 and 256 robots take long and are measured by `--sizes` alone.
-Times are wall-clock, of planning in process; a plan counts if the verifier finds
-nothing wrong with it. With --drive it is driven in MuJoCo, too, and must end as
-planned: how many times faster than real time comes last in its line. Memory is the
-process's peak so far. The last table has one line for the missions of one size, with
-the times of those whose plan counts. The exponent of growth is the slope of a line
+for 16 robots). Times are wall-clock, of planning in process; a plan counts if the
+verifier finds nothing wrong with it. With --drive it is driven in MuJoCo, too, and must
+end as planned: how many times faster than real time comes last in its line. Memory is
+the process's peak so far. The last table has one line for the missions of one size,
+with the times of those whose plan counts. The exponent of growth is the slope of a line
 through the logarithms of the sizes and of the median times to the first plan.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
@@ -99,9 +98,6 @@ SERIES = {
     "fleets": [Case.of_fleet(n) for n in (4, 8, 16, 32, 64, 128, 256)],
 }
 
-USUAL_MOST = {"fleets": 32}
-"""Largest sizes that are measured unless `--sizes` or `--most` names others."""
-
 
 def main() -> int:
     """Measure all chosen series; return 1 if a mission has no verified plan."""
@@ -141,7 +137,7 @@ def is_chosen(case: Case, sizes: Sequence[int] | None, most: int | None) -> bool
     """Return whether a mission's size is among those that are asked for."""
     if sizes is not None:
         return case.size in sizes
-    return case.size <= (most or USUAL_MOST.get(case.series, case.size))
+    return most is None or case.size <= most
 
 
 def measure(

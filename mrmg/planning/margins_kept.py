@@ -70,9 +70,9 @@ def _narrow(
     least_m = margin_m - ROUNDING_M
     within_m = robot.model.circumscribed_radius_m + least_m
     place, n = trajectory.state[:, :2], len(trajectory.state)
-    first = np.arange(0, n, STRETCH)
-    low = np.minimum.reduceat(place, first) - within_m
-    high = np.maximum.reduceat(place, first) + within_m
+    begins = np.arange(0, n, STRETCH)
+    low = np.minimum.reduceat(place, begins) - within_m
+    high = np.maximum.reduceat(place, begins) + within_m
     near = tree.query(shapely.box(*low.T, *high.T), predicate="intersects")[0]
     close = np.flatnonzero(np.isin(np.arange(n) // STRETCH, near))
     bodies = shapely.polygons(robot.model.footprint_at(trajectory.state[close]))

@@ -48,8 +48,8 @@ def test_ground_grows_with_a_fleet() -> None:
 def test_sizes_are_chosen() -> None:
     usual, large = Case.of_fleet(32), Case.of_fleet(64)
     for sizes, most, chosen in (
-        (None, None, (True, False)),
-        (None, 64, (True, True)),
+        (None, None, (True, True)),
+        (None, 32, (True, False)),
         ([64], None, (False, True)),
     ):
         found = tuple(bench_growth.is_chosen(x, sizes, most) for x in (usual, large))
