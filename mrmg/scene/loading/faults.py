@@ -15,6 +15,9 @@ from mrmg.errors import Fault, SceneError, nearest
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
+NO_NAME = "''"
+"""An empty key in the path of a fault."""
+
 _KINDS = {
     "float_type": "expected a number",
     "float_parsing": "expected a number",
@@ -91,7 +94,7 @@ def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
     kind: str = detail["type"]
     value = detail["input"]
     # A start energy is mostly spelt as a bare number, which means a fraction.
-    path = ".".join(str(part) for part in loc).removesuffix(".fraction")
+    path = ".".join(str(part) or NO_NAME for part in loc).removesuffix(".fraction")
     if kind == "extra_forbidden":
         return Fault(path, unknown_key(str(loc[-1]), _known_keys(model, loc[:-1])))
     wanted = _description(model, loc)

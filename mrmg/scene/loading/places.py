@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from mrmg.errors import SceneError
+from mrmg.scene.loading.faults import NO_NAME
 from mrmg.scene.loading.shape_schema import ID_PATTERN
 
 
@@ -57,8 +58,9 @@ def _step(
     """
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
-            if f"{path}.".startswith(f"{key.value}."):
-                return key.start_mark, value, path[len(key.value) + 1 :]
+            name = key.value or NO_NAME
+            if f"{path}.".startswith(f"{name}."):
+                return key.start_mark, value, path[len(name) + 1 :]
     elif isinstance(node, yaml.SequenceNode):
         index, _, rest = path.partition(".")
         if index.isdecimal() and int(index) < len(node.value):
