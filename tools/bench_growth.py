@@ -112,11 +112,11 @@ def main() -> int:
     print(f"\n{summary(table)}\n")
     for name, power in powers.items():
         print(f"time to the first plan by {name}: size to the power of {power:.2f}")
-    if options.figure:
-        draw(rows, options.figure)
     ok = all(row["ok"] for row in rows)
     exponents = [{"series": name, "exponent": x} for name, x in powers.items()]
     write_document(options, "bench_growth", table, ok, exponents=exponents)
+    if options.figure:
+        draw(rows, options.figure)
     return 0 if ok else 1
 
 
