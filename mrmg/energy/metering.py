@@ -267,7 +267,7 @@ def battery_content(
 def _held(begun_J: float, gain_J: np.ndarray, capacity_J: float) -> np.ndarray:
     """Return what a battery holds at first and after each gain; no more goes in."""
     held_J = np.cumsum(np.append(begun_J, gain_J))
-    if held_J.max() <= capacity_J:
+    if held_J.max() <= capacity_J:  # mostly, and much sooner than state by state
         return held_J
     gains_J, limit = gain_J.tolist(), capacity_J
     limited = accumulate(gains_J, lambda a, b: min(a + b, limit), initial=begun_J)

@@ -18,7 +18,8 @@ ROUNDING_M = 1e-7
 """Distance that a margin may be missed by for rounding alone [m]."""
 
 STRETCH = 50
-"""States that are looked at one by one only if their box is near an obstacle."""
+"""States in a row, which are looked at one by one only if a box about them is near an
+obstacle: for 64 robots that takes a tenth of the time."""
 
 
 def with_least_spacing(scene: Scene, margins: Margins) -> Scene:

@@ -94,6 +94,7 @@ def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
         return {
             "series": "robots", "size": size, "robots": size, "goals": 20,
             "obstacles": 50, "ok": ok, "memory_MB": 250.4, "populate_s": 0.5,
+            "plan_s": 2.0 * first_s,
             "time_s": {"first_solution": first_s, "routing": 0.25},
         }  # fmt: skip
 
@@ -105,7 +106,11 @@ def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
         row(8, 3.0, ok=False),
     ]
     lines = bench_growth.summary(bench_growth.sizes_of(rows)).splitlines()
-    assert lines[2] == "| robots | 2 | 20 | 50 | 2 of 3 | 0.60, 0.70 | 0.25 | 250 |"
-    assert lines[3] == "| robots | 4 | 20 | 50 | 1 of 1 | 2.00, 2.00 | 0.25 | 250 |"
-    assert lines[4] == "| robots | 8 | 20 | 50 | 0 of 1 | nan, nan | nan | 250 |"
-    assert {line.count("|") for line in lines} == {9}
+    assert (
+        lines[2] == "| robots | 2 | 20 | 50 | 2 of 3 | 0.60, 0.70 | 1.20 | 0.25 | 250 |"
+    )
+    assert (
+        lines[3] == "| robots | 4 | 20 | 50 | 1 of 1 | 2.00, 2.00 | 4.00 | 0.25 | 250 |"
+    )
+    assert lines[4] == "| robots | 8 | 20 | 50 | 0 of 1 | nan, nan | nan | nan | 250 |"
+    assert {line.count("|") for line in lines} == {10}
