@@ -44,6 +44,7 @@ COMMANDS = {
     "docks_diffdrive": "bench_docks --halls 0-31 --execute",
     "headings_car": "bench_headings --yards 0-31 --execute",
     "headings_diffdrive": "bench_headings --model diffdrive --yards 0-31 --execute",
+    "bays_car": "bench_headings --bays 3 --yards 0-31 --execute",
     "clmapf": "bench_clmapf --seeds 0-2",
     "kinodynamic": "bench_kinodynamic",
     "routing": "bench_routing",

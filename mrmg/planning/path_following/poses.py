@@ -7,24 +7,27 @@ slow for their size with stops where they steer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import pi
+from math import cos, pi, sin
 
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following import _pose_kernels, _shortening_kernels
 from mrmg.planning.path_following._band_kernels import CostMap, Stops
+from mrmg.planning.path_following._curve_kernels import PIECES, SHORTEST_M
 from mrmg.planning.path_following._pose_kernels import POSE, PoseSearch
-from mrmg.planning.path_following._shortening_kernels import SHORTEST_M
 from mrmg.planning.path_following.band import Path, visit_steps
 from mrmg.planning.path_following.coordination.fields import Fields
-from mrmg.planning.path_following.cost_map import ROOM_SHARE
+from mrmg.planning.path_following.coordination.tasks import arrival_poses
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import drive_alone
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import poses_at
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 
 HEADINGS = 32
 """Headings in a full turn."""
@@ -32,15 +35,21 @@ HEADINGS = 32
 BEND_SHARE = 0.95
 """Curvature of turns, as a share of the sharpest that paths may have."""
 
-CELL_SHARES = (0.8, 0.27, 0.27)
-"""Side of a cell, as a share of an arc's length: away from targets, near one, and near
-the start."""
+CELL_SHARES = (0.8, 0.27)
+"""Side of a cell, as a share of an arc's length: away from the start and targets, and
+near them."""
 
 JUMP_SHARE = 0.5
 """Change of curvature that a car may stop for, as a share of that of its turns."""
 
 STRAIGHT_SHARE = 0.5
 """Arc's length of a robot that turns on the spot, as a share of its radius."""
+
+GATES = 10
+"""Places of gates before a target in either gear, the robot's radius apart."""
+
+DRAWN_IN = 5
+"""Poses on the way to a target's middle that are looked at."""
 
 DEEPER_M = 0.03
 """How much deeper than needed targets are entered: driving is a little off its way."""
@@ -52,9 +61,12 @@ SOON_WEIGHT = 1.3
 """Weight of the cost-to-go where ways are wanted soon: it takes two thirds of the time,
 and ways cost more."""
 
-ROOMS_M = (0.03, 0.0)
-"""Room beyond the margin near targets, in successive tries: there are places with no
-more room than the margin."""
+ROOM_SHARE = 0.06
+"""Room beyond the margin that ways leave where they can, as a share of the robot's
+radius: driving is a little off them."""
+
+TIGHT_SHARE = 8.0
+"""What an arc costs more where it does not leave it, as a share of its length."""
 
 MOST_POSES = 200_000
 """Poses of a search at most: about half a second, and 25 MB."""
@@ -87,17 +99,21 @@ def posed(
     if own[0]["model"] == UNICYCLE:
         length, change_m = STRAIGHT_SHARE * float(own[0]["radius"]), 0.0
     deeper = np.full(len(tour), DEEPER_M)
+    gates, gate = _gates(problem, r, tour)
     search = PoseSearch(
         own=own,
         start=problem.start[r, :3].copy(),
         spaces=problem.mission.spaces,
         stops=Stops(targets, target, target, deeper, problem.aims(r, tour)),
+        gates=gates,
+        gate=gate,
         guide=Fields(problem).static(r, tour),
         bend=bend,
         length=length,
         headings=HEADINGS,
         cell=length * np.array(CELL_SHARES),
-        room=np.full(3, own[0]["margin"]),
+        room=ROOM_SHARE * float(own[0]["radius"]),
+        tight=TIGHT_SHARE * length / PIECES,
         near=2.0 * float(own[0]["radius"]),
         scrub=cost_map.scrub,
         change=change_m,
@@ -113,24 +129,70 @@ def posed(
     return RobotTask(list(tour), ways[0], cost_map) if ways else None
 
 
+def _gates(
+    problem: Problem, r: int, tour: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (gates, gate) to robot r's targets, as `PoseSearch` has them."""
+    targets, ends = problem.mission.targets.target, arrival_poses(problem, r, tour)
+    reverses = problem.mission.fleet["limit"][r, 0] < 0.0
+    gates, gate = list[tuple[float, ...]](), [0]
+    for target, end in zip(tour, ends, strict=False):
+        deep = _drawn_in(problem, target, end)
+        if targets["tolerance"][target] < pi and deep is not None:
+            gates += _gates_before(problem, r, deep, 1)
+            gates += _gates_before(problem, r, deep, -1) if reverses else []
+        gate.append(len(gates))
+    return np.array(gates, float).reshape(-1, 4), np.array(gate)
+
+
+def _drawn_in(problem: Problem, target: int, end: np.ndarray) -> np.ndarray | None:
+    """Return a pose deep enough in a target, on the line ahead of a given one.
+
+    The nearest of some on the way to the target's middle; None if there is none.
+    """
+    region = poses_at(problem.mission.targets, target).region
+    ahead = np.array([cos(end[2]), sin(end[2]), 0.0])
+    far_m = (region.center - end[:2]) @ ahead[:2]
+    poses = end + np.linspace(0.0, far_m, DRAWN_IN)[:, None] * ahead
+    deep = region.depth(poses[:, :2]) >= DEEPER_M
+    return poses[deep.argmax()] if deep.any() else None
+
+
+def _gates_before(
+    problem: Problem, r: int, end: np.ndarray, gear: int
+) -> Iterator[tuple[float, ...]]:
+    """Yield the gates from which robot r drives to a pose straight in some gear.
+
+    They leave room beyond the margin, and so does the way on from them for a while:
+    driving comes off a turn a little askew.
+    """
+    own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
+    margin_m, radius_m = float(own[0]["margin"]), float(own[0]["radius"])
+    corner, run_up = np.empty((MOST_CORNERS, 2)), True
+    for i in range(GATES):
+        way_m = gear * i * radius_m
+        gate = end - way_m * np.array([cos(end[2]), sin(end[2]), 0.0])
+        if not keeps_clear(own, spaces, gate, margin_m, corner):
+            return
+        room_m = margin_m + ROOM_SHARE * radius_m
+        roomy = keeps_clear(own, spaces, gate, room_m, corner)
+        if roomy and run_up:
+            yield (*gate, way_m)
+        run_up = roomy
+
+
 def _ways_of(search: PoseSearch) -> tuple[Path, ...]:
     """Return the way over poses that a search finds, as it is and to stop and steer.
 
     Nothing if it finds none. Cars stop where the way's curvature jumps.
     """
-    margin_m, stops = float(search.own[0]["margin"]), search.stops
-    poses = np.empty(MOST_POSES, POSE)
-    for room_m in ROOMS_M:
-        room = margin_m + np.array([ROOM_SHARE * margin_m, room_m, 0.0])
-        search = search._replace(room=room)
-        table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
-        last = _pose_kernels.find_poses(search, poses, table)
-        if last != _pose_kernels.NO_WAY:
-            break
+    stops, poses = search.stops, np.empty(MOST_POSES, POSE)
+    table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
+    last = _pose_kernels.find_poses(search, poses, table)
     if last < 1:
         return ()
-    pose, stop = _pose_kernels.poses_to(search, poses, last)
-    way, stop = _shortening_kernels.shortest_way(search, pose, stop)
+    pose, stop, kept = _pose_kernels.poses_to(search, poses, last)
+    way, stop = _shortening_kernels.shortest_way(search, pose, stop, kept)
     moves = np.append(True, np.hypot(*np.diff(way[:, :2], axis=0).T) > SHORTEST_M)
     number = np.cumsum(moves) - 1
     path = Path(
