@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from math import atan2, sin
 from pathlib import Path
 
 import bench_headings
+import numpy as np
 import pytest
+from shapely.geometry import Point
 
 
 def test_the_bench_plans_in_yards_and_writes_rows(
@@ -31,3 +34,19 @@ def test_yards_are_the_same_again_and_all_differ() -> None:
     assert len({one.digest for one in yards}) == 4
     aimed = [goal.heading_rad is not None for goal in yards[0].goals]
     assert aimed == [True] * 2 + [False] * 5
+
+
+def test_robots_end_in_bays() -> None:
+    """A bay's walls stand 8 cm beside a robot, which heads along them at its end."""
+    scene = bench_headings.yard("car", 3, 0, 2)
+    assert len(scene.obstacles) == 2 * 2
+    for i, robot in enumerate(scene.robots[:2]):
+        low, high = (one.shape for one in scene.obstacles[2 * i : 2 * i + 2])
+        assert low.distance(high) == pytest.approx(1.1 + 2 * 0.08)
+        assert robot.finish is not None
+        end = Point(robot.finish.region.center)
+        assert abs(low.distance(end) - high.distance(end)) <= 2 * 0.15
+        assert robot.finish.heading_rad is not None
+        across = np.subtract(high.centroid.coords, low.centroid.coords)[0]
+        off = sin(robot.finish.heading_rad - atan2(across[1], across[0]))
+        assert abs(abs(off) - 1.0) < 0.01
