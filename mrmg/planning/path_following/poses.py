@@ -49,7 +49,8 @@ GATES = 10
 """Places of gates before a target in either gear, the robot's radius apart."""
 
 DRAWN_IN = 5
-"""Poses on the way to a target's middle that are looked at."""
+"""Poses between that of most room and a target's middle, of which one that is deep
+enough inside is driven to."""
 
 DEEPER_M = 0.03
 """How much deeper than needed targets are entered: driving is a little off its way."""
@@ -66,10 +67,10 @@ ROOM_SHARE = 0.06
 radius: driving is a little off them."""
 
 TIGHT_SHARE = 8.0
-"""What an arc costs more where it does not leave it, as a share of its length."""
+"""What an arc without that room costs more, as a share of its length."""
 
 MOST_POSES = 200_000
-"""Poses of a search at most: about half a second, and 25 MB."""
+"""Poses of a search at most: half a second, one with gates, and 25 MB."""
 
 
 def posed(
