@@ -49,8 +49,8 @@ GATES = 10
 """Places of gates before a target in either gear, the robot's radius apart."""
 
 DRAWN_IN = 5
-"""Poses between that of most room and a target's middle, of which one that is deep
-enough inside is driven to."""
+"""Poses looked at from that of most room towards a target's middle: the first one that
+is deep enough in the target is driven to."""
 
 DEEPER_M = 0.03
 """How much deeper than needed targets are entered: driving is a little off its way."""
@@ -70,7 +70,7 @@ TIGHT_SHARE = 8.0
 """What an arc without that room costs more, as a share of its length."""
 
 MOST_POSES = 200_000
-"""Poses of a search at most: half a second, one with gates, and 25 MB."""
+"""Poses of a search at most: half a second, or a second with gates, and 25 MB."""
 
 
 def posed(
