@@ -69,16 +69,28 @@ def first_conflict(own, traffic, other, state, count, first, corner):
 
 
 @kernel
-def blocked_for_good(own, traffic, state, first, corner):
-    """Return whether a robot that stands from step `first` on is ever run into."""
-    still = state.reshape(1, 5)
+def standing_cost(own, traffic, state, first, soft_s, corner):
+    """Return what it costs others that a robot stands from step `first` on [s].
+
+    Args:
+        own: the robot, shape (1,).
+        traffic: the others.
+        state: in which it stands.
+        first: step.
+        soft_s: for each one that runs into it; inf if that one has priority.
+        corner: room for two footprints, shape (2, M, 2).
+    """
+    still, cost = state.reshape(1, 5), 0.0
     for other in range(len(traffic.robot)):
-        count = max(1, traffic.robot[other].last - first + 1)
-        if traffic.robot[other].hard and (
-            first_conflict(own, traffic, other, still, count, first - 1, corner) >= 0
-        ):
-            return True
-    return False
+        robot = traffic.robot[other]
+        if not (robot.hard or robot.soft):
+            continue
+        count = max(1, robot.last - first + 1)
+        if first_conflict(own, traffic, other, still, count, first - 1, corner) >= 0:
+            if robot.hard:
+                return np.inf
+            cost += soft_s
+    return cost
 
 
 @kernel

@@ -9,8 +9,8 @@ import numpy as np
 from mrmg.compilation import borrowed, inlined, kernel
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
 from mrmg.planning.path_following.coordination._conflict_kernels import (
-    blocked_for_good,
     first_conflict,
+    standing_cost,
 )
 from mrmg.planning.path_following.coordination._motion_kernels import (
     BRAKE,
@@ -196,9 +196,10 @@ def add_end(search, nodes, room, a, motion, count):
     if count < 0 or (finish >= 0 and not at_target(search.targets, finish, last)):
         return False
     conflict_s = passing_cost(search, room, count, first)
-    if not conflict_s < np.inf or blocked_for_good(
-        search.own, search.traffic, last, first + count, room.corner
-    ):
+    conflict_s += standing_cost(
+        search.own, search.traffic, last, first + count, search.task.soft_s, room.corner
+    )
+    if not conflict_s < np.inf:
         return False
     b = nodes.size[0]
     nodes.size[0] = b + 1

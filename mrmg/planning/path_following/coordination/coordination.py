@@ -123,7 +123,7 @@ class _Planning:
                 stiffness=1.0,
             ),
         )
-        self.round, self.nodes, self.most = ROUNDS[0], 0, np.inf
+        self.round, self.nodes = ROUNDS[0], 0
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
@@ -139,12 +139,7 @@ class _Planning:
         yielding: bool = False,
         since: int = 0,
     ) -> Motion | None:
-        """Return a motion of robot r without conflicts with the robots marked.
-
-        None, too, once as many nodes have been looked at as may be.
-        """
-        if self.nodes >= self.most:
-            return None
+        """Return a motion of robot r without conflicts with the robots marked."""
         self.nodes += 1
         asked = (r, self.round, yielding, since, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
@@ -266,7 +261,7 @@ class _Planning:
             first: round that is tried first.
             halt: shape (1,); the search ends soon after it has turned true.
         """
-        self.most, harder = np.inf, [one for one in ROUNDS if one.most > first.most]
+        harder = [one for one in ROUNDS if one.most > first.most]
         motions = [None if drive is None else drive.motion for drive in drives]
         nobody = np.zeros(len(motions), bool)
         for r in order:

@@ -32,14 +32,9 @@ class MotionPlanning(Protocol):
 
     Attributes:
         nodes: that have been looked at for all motions so far.
-        most: nodes after which no motion is found any more.
     """
 
     nodes: int
-    most: float
-
-    def kept(self, r: int, motion: Motion) -> Motion:
-        """Return a motion of robot r that is kept; equal ones are one object."""
 
     def find(
         self,
@@ -97,7 +92,7 @@ def search_priorities(
     Args:
         motions: one for each robot, found without regard to the others.
         planning: finds motions.
-        most: nodes that all searches for motions may look at.
+        most: nodes after which no further motion is searched for.
         halt: shape (1,); the search ends soon after it has turned true.
     """
     robots = len(motions)
@@ -106,8 +101,8 @@ def search_priorities(
         return tuple(motions)
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
     stack, seen = [_children(root, planning)], set()  # two may make room in turn
-    planning.most = planning.nodes + most
-    while stack and planning.nodes < planning.most and not halt[0]:
+    most += planning.nodes
+    while stack and planning.nodes < most and not halt[0]:
         child = next(stack[-1], None)
         if child is None:
             stack.pop()
@@ -225,13 +220,13 @@ def shortened(
     """
     best = list(motions)
     nodes = planning.nodes
-    planning.most = nodes + max(SHORTENING_LEAST, SHORTENING_SHARE * nodes)
+    most = nodes + max(SHORTENING_LEAST, SHORTENING_SHARE * nodes)
     lost = {
         r: len(motions[r].control) - len(one.control) for r, one in enumerate(alone)
     }
     losing = [r for r in sorted(lost, key=lambda r: -lost[r]) if lost[r] > 0]
     for r, share in product(losing, SINCE_SHARES):
-        if planning.nodes >= planning.most or halt[0]:
+        if planning.nodes >= most or halt[0]:
             break
         since, others = int(share * len(best[r].control)), np.arange(len(best)) != r
         found = planning.find(r, best, others, yielding=True, since=since)

@@ -9,8 +9,8 @@ import pytest
 import shapely
 
 from mrmg.planning.path_following.coordination._conflict_kernels import (
-    blocked_for_good,
     first_conflict,
+    standing_cost,
 )
 from mrmg.planning.path_following.coordination._motion_kernels import (
     OTHER,
@@ -23,6 +23,7 @@ from mrmg.scene.types import Scene
 
 STEP_M = 0.2
 STEPS = 60
+SOFT_S = 4.0
 
 
 @pytest.fixture
@@ -60,7 +61,10 @@ def traffic_of(problem: Problem, states: np.ndarray, *, hard: bool = True) -> Tr
         pose=pose,
         middle=pose[:, :, :2] + np.stack([np.zeros_like(offset), offset]),
         robot=np.array(
-            [(0, closing_m, False, False), (len(states) - 1, closing_m, hard, False)],
+            [
+                (0, closing_m, False, False),
+                (len(states) - 1, closing_m, hard, not hard),
+            ],
             OTHER,
         ),
         busy=np.zeros((1, len(states)), bool),
@@ -129,16 +133,16 @@ def test_robots_that_meet_between_steps_are_in_conflict(
 
 
 @pytest.mark.parametrize(
-    ("aside_m", "hard", "blocked"),
-    [(0.0, True, True), (0.0, False, False), (3.0, True, False)],
+    ("aside_m", "hard", "cost_s"),
+    [(0.0, True, np.inf), (0.0, False, SOFT_S), (3.0, True, 0.0), (3.0, False, 0.0)],
 )
-def test_who_stays_is_not_in_the_way_of_others(
-    problem: Problem, aside_m: float, hard: bool, blocked: bool
+def test_who_stays_in_the_way_of_others_pays_for_it(
+    problem: Problem, aside_m: float, hard: bool, cost_s: float
 ) -> None:
     own = problem.start[0] + [0.0, aside_m, 0.0, 0.0, 0.0]
     traffic = traffic_of(problem, straight(problem.start[1], 80), hard=hard)
-    found = blocked_for_good(problem.mission.fleet[:1], traffic, own, 0, corners())
-    assert found == blocked
+    fleet = problem.mission.fleet[:1]
+    assert standing_cost(fleet, traffic, own, 0, SOFT_S, corners()) == cost_s
 
 
 @pytest.mark.parametrize(("steps", "kept"), [(60, True), (118, False)])

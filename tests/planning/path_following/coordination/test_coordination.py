@@ -9,7 +9,6 @@ import pytest
 
 import mrmg
 from mrmg.planning import PlannerParams
-from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import coordination
 from mrmg.planning.path_following.coordination.coordination import (
     coordinated,
@@ -82,16 +81,21 @@ def test_a_robot_sets_out_by_shorter_motions_where_there_is_no_room_for_longer_o
     assert mrmg.verify(scene, plan).ok
 
 
-def test_no_motion_is_found_once_a_search_has_taken_its_nodes(
+def test_a_robot_without_targets_makes_room(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
-    problem, tours, paths = _two_robots(yard, state)
-    planning = coordination._Planning(problem, tours, paths, [None, None], 2000)
-    none = [None, None], np.zeros(2, bool)
-    planning.most = planning.nodes
-    assert planning.find(0, *none, yielding=True) is None
-    planning.most += 1
-    assert planning.find(0, *none, yielding=True) is not None
+    poses = {"drives": [6, 10, 0], "stands": [12, 10, 0]}
+    robots = [
+        {"id": name, "model": "diffdrive", "pose": pose} for name, pose in poses.items()
+    ]
+    problem = state(yard(robots=robots), samples=50)
+    paths = [no_path(problem, r) for r in range(2)]
+    planning = coordination._Planning(problem, [[], []], paths, [None, None], 2000)
+    away = problem.trajectory(0, np.repeat([[0.4, 0.0], [0.0, 0.0]], [20, 60], axis=0))
+    motions = [Motion(away.state, away.control), None]
+    found = planning.find(1, motions, np.zeros(2, bool), yielding=True)
+    assert found is not None
+    assert not np.isfinite(planning.conflicts(1, [motions[0], found])).any()
 
 
 def test_a_motion_that_begins_anew_is_the_old_one_until_then(
@@ -108,15 +112,6 @@ def test_a_motion_that_begins_anew_is_the_old_one_until_then(
     assert found is not None
     assert np.array_equal(found.state[:16], away.state[:16])
     assert np.hypot(*(found.state[:, :2] - (12.0, 5.0)).T).min() < 1.0
-
-
-def _two_robots(
-    yard: Callable[..., Scene], state: Callable[..., Problem]
-) -> tuple[Problem, list[list[int]], list[Path]]:
-    """Return a problem of two robots without targets, with their tours and paths."""
-    robots = [{"id": f"r{y}", "model": "diffdrive", "pose": [6, y, 0]} for y in (8, 12)]
-    problem = state(yard(robots=robots), samples=50)
-    return problem, [[], []], [no_path(problem, r) for r in range(2)]
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive", "husky"])

@@ -23,8 +23,6 @@ LONG = 40
 class Crossing:
     """Robots that cross one place; `slow` ones need so many steps to it."""
 
-    most = np.inf
-
     def __init__(self, approach: Sequence[int], latest: Sequence[int]) -> None:
         self.approach, self.latest = approach, latest
         self.asked: list[int] = []
@@ -166,7 +164,7 @@ def test_conflicts_of_robots_with_priorities_come_before_sooner_ones() -> None:
 class Shuttle:
     """Robot 2 is in the way of 0 or of 1, and goes to and fro to let them pass."""
 
-    nodes, most = 1, np.inf
+    nodes = 1
     still = Motion(np.zeros((1, 5)), np.zeros((1, 2)))
 
     def __init__(self) -> None:
