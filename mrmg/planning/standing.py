@@ -76,8 +76,9 @@ def roomiest_pose(
     poses: Poses,
     enough_m: float = 0.0,
     accuracy_m: float = ACCURACY_M,
+    edge_m: float = inf,
 ) -> Room | None:
-    """Return the pose in which a body is farthest from obstacles, or far enough.
+    """Return the pose in which a body has most room, or enough of it.
 
     None if it surely meets an obstacle, or leaves the map, in every pose.
 
@@ -85,8 +86,9 @@ def roomiest_pose(
         scene: gives obstacles and bounds.
         robot: the body.
         poses: from which one is chosen.
-        enough_m: distance from obstacles that is far enough.
+        enough_m: room that is enough.
         accuracy_m: by which it may be less than the most.
+        edge_m: room at the region's edge, to which the depth inside is added.
     """
     outline, reach_m = robot.model.footprint_m, robot.model.circumscribed_radius_m
     low_m, high_m = np.reshape(shapely.bounds(poses.region.shape), (2, 2))
@@ -110,12 +112,13 @@ def roomiest_pose(
         stray_m = off_m + moved_m[2]
         bodies = shapely.polygons(placed(outline, boxes))
         room_m = np.where(meets(bodies), -inf, shapely.distance(edges, bodies))
-        inside_m = np.where(depth_m >= 0.0, room_m, -inf)
+        within_m = np.minimum(room_m, depth_m + edge_m)
+        inside_m = np.where(depth_m >= 0.0, within_m, -inf)
         if inside_m.max() > best_m:
             best, best_m = boxes[inside_m.argmax()], float(inside_m.max())
         if best_m >= enough_m:
             return Room(best, best_m, inf)
-        bound_m = np.maximum(room_m, 0.0) + stray_m
+        bound_m = np.minimum(room_m.clip(0.0) + stray_m, depth_m + off_m + edge_m)
         left = (depth_m >= -off_m) & (bound_m > best_m + accuracy_m)
         core = _shrunk(outline, stray_m)
         if len(core):
@@ -125,11 +128,17 @@ def roomiest_pose(
             return Room(best, best_m, best_m + accuracy_m) if best_m >= 0.0 else None
         if moved_m.max() < FINEST_SHARE * accuracy_m:
             break
-        divided = moved_m > moved_m.max() / 2.0
-        half = np.where(divided, half / 2.0, half)
-        steps = [(-1.0, 1.0) if each else (0.0,) for each in divided]
-        boxes = np.concatenate([boxes + half * step for step in product(*steps)])
+        boxes, half = _divided(boxes, half, moved_m > moved_m.max() / 2.0)
     return Room(best, best_m, max(float(bound_m.max()), best_m + accuracy_m))
+
+
+def _divided(
+    boxes: np.ndarray, half: np.ndarray, sides: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return boxes of poses divided across some of their sides, and half of these."""
+    half = np.where(sides, half / 2.0, half)
+    steps = [(-1.0, 1.0) if each else (0.0,) for each in sides]
+    return np.concatenate([boxes + half * step for step in product(*steps)]), half
 
 
 def _shrunk(outline: np.ndarray, by_m: float) -> np.ndarray:

@@ -104,8 +104,9 @@ def test_room_beside_the_region_is_none(back_m: float, fits: bool) -> None:
     assert (found(room([wall], finish, "car")) is not None) is fits
 
 
+@pytest.mark.parametrize("edge_m", [np.inf, 0.1])
 @pytest.mark.parametrize("seed", range(40))
-def test_no_other_pose_has_more_room(seed: int) -> None:
+def test_no_other_pose_has_more_room(seed: int, edge_m: float) -> None:
     rng = np.random.default_rng(seed)
     boxes = [
         {
@@ -123,20 +124,30 @@ def test_no_other_pose_has_more_room(seed: int) -> None:
     angle = rng.uniform(0, 2 * pi, 3000)
     yaw = heading + rng.uniform(-tolerance, tolerance, 3000)
     around = np.stack([np.cos(angle), np.sin(angle)], axis=1) * offset[:, None]
-    known_m = clearance_m(scene, np.column_stack([center + around, yaw])).max()
     region = Region(center=center, radius_m=radius, corners=np.zeros((0, 2)))
-    poses = Poses(region, heading, tolerance)
-    best = roomiest_pose(scene, scene.robots[0], poses, enough_m=5.0)
+
+    def most_m(poses: np.ndarray) -> float:
+        edges_m = edge_m + region.depth(poses[:, :2])
+        return float(np.minimum(clearance_m(scene, poses), edges_m).max())
+
+    known_m = most_m(np.column_stack([center + around, yaw]))
+    best = roomiest_pose(
+        scene,
+        scene.robots[0],
+        Poses(region, heading, tolerance),
+        enough_m=5.0,
+        edge_m=edge_m,
+    )
     if best is None:
         assert known_m == -np.inf
         return
-    pose, room_m, most_m = best
-    assert most_m >= known_m
+    pose, room_m, bound_m = best
+    assert bound_m >= known_m
     assert room_m >= known_m - ACCURACY_M
     assert np.hypot(*(pose[:2] - center)) <= radius + 1e-9
     assert abs(pose[2] - heading) <= tolerance + 1e-9
     if room_m > -np.inf:
-        assert room_m == pytest.approx(clearance_m(scene, pose[None])[0])
+        assert room_m == pytest.approx(most_m(pose[None]))
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -28,6 +28,7 @@ from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import poses_at
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+from mrmg.scene.region import Region
 
 HEADINGS = 32
 """Headings in a full turn."""
@@ -53,7 +54,8 @@ DRAWN_IN = 5
 is deep enough in the target is driven to."""
 
 DEEPER_M = 0.03
-"""How much deeper than needed targets are entered: driving is a little off its way."""
+"""How much deeper than needed targets are entered: driving is a little off its way. Of
+small targets, and where there is little room, it is half of what there is."""
 
 CHANGE_M = 1.0
 """Plain ground that a change of gear is worth to a car [m]."""
@@ -99,8 +101,7 @@ def posed(
     length, change_m = 2.0 * pi / HEADINGS / bend, CHANGE_M
     if own[0]["model"] == UNICYCLE:
         length, change_m = STRAIGHT_SHARE * float(own[0]["radius"]), 0.0
-    deeper = np.full(len(tour), DEEPER_M)
-    gates, gate = _gates(problem, r, tour)
+    gates, gate, deeper = _gates(problem, r, tour)
     search = PoseSearch(
         own=own,
         start=problem.start[r, :3].copy(),
@@ -132,31 +133,35 @@ def posed(
 
 def _gates(
     problem: Problem, r: int, tour: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return (gates, gate) to robot r's targets, as `PoseSearch` has them."""
-    targets, ends = problem.mission.targets.target, arrival_poses(problem, r, tour)
-    reverses = problem.mission.fleet["limit"][r, 0] < 0.0
-    gates, gate = list[tuple[float, ...]](), [0]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (gates, gate, deeper) for robot r's targets, as `PoseSearch` has them."""
+    targets, ends = problem.mission.targets, arrival_poses(problem, r, tour)
+    gears = (1, -1) if problem.mission.fleet["limit"][r, 0] < 0.0 else (1,)
+    gates, gate, deeper = list[tuple[float, ...]](), [0], list[float]()
     for target, end in zip(tour, ends, strict=False):
-        deep = _drawn_in(problem, target, end)
-        if targets["tolerance"][target] < pi and deep is not None:
-            gates += _gates_before(problem, r, deep, 1)
-            gates += _gates_before(problem, r, deep, -1) if reverses else []
+        region = poses_at(targets, target).region
+        if targets.target["tolerance"][target] < pi:
+            end = _drawn_in(problem, r, region, end)
+            for gear in gears:
+                gates += _gates_before(problem, r, end, gear)
         gate.append(len(gates))
-    return np.array(gates, float).reshape(-1, 4), np.array(gate)
+        deeper.append(min(DEEPER_M, 0.5 * region.depth(end[:2]).item()))
+    return np.array(gates, float).reshape(-1, 4), np.array(gate), np.array(deeper)
 
 
-def _drawn_in(problem: Problem, target: int, end: np.ndarray) -> np.ndarray | None:
+def _drawn_in(problem: Problem, r: int, region: Region, end: np.ndarray) -> np.ndarray:
     """Return a pose deep enough in a target, on the line ahead of a given one.
 
-    The nearest of some on the way to the target's middle; None if there is none.
+    The nearest of some on the way to the target's middle; where none is deep enough, or
+    robot r has no room there, the given one.
     """
-    region = poses_at(problem.mission.targets, target).region
+    own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
+    margin_m, corner = float(own[0]["margin"]), np.empty((MOST_CORNERS, 2))
     ahead = np.array([cos(end[2]), sin(end[2]), 0.0])
     far_m = (region.center - end[:2]) @ ahead[:2]
     poses = end + np.linspace(0.0, far_m, DRAWN_IN)[:, None] * ahead
-    deep = region.depth(poses[:, :2]) >= DEEPER_M
-    return poses[deep.argmax()] if deep.any() else None
+    pose = poses[(region.depth(poses[:, :2]) >= DEEPER_M).argmax()]
+    return pose if keeps_clear(own, spaces, pose, margin_m, corner) else end
 
 
 def _gates_before(
@@ -165,7 +170,7 @@ def _gates_before(
     """Yield the gates from which robot r drives to a pose straight in some gear.
 
     They leave room beyond the margin, and so does the way on from them for a while:
-    driving comes off a turn a little askew.
+    driving comes off a turn a little askew. The pose itself is one in any case.
     """
     own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
     margin_m, radius_m = float(own[0]["margin"]), float(own[0]["radius"])
@@ -177,7 +182,7 @@ def _gates_before(
             return
         room_m = margin_m + ROOM_SHARE * radius_m
         roomy = keeps_clear(own, spaces, gate, room_m, corner)
-        if roomy and run_up:
+        if (roomy and run_up) or i == 0:
             yield (*gate, way_m)
         run_up = roomy
 

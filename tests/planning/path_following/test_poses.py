@@ -47,6 +47,7 @@ def hall(
     model: str = "car",
     walls: list[tuple[str, list[float], list[float]]] = AISLE,
     margin_m: float = 0.25,
+    radius_m: float = 0.3,
 ) -> Scene:
     """Return a hall of 16 x 12 m with two racks, and goals for one robot.
 
@@ -57,6 +58,7 @@ def hall(
         model: of the robot.
         walls: name, middle and size of each rack [m].
         margin_m: that the robot keeps from them.
+        radius_m: of goals.
     """
     robot: dict[str, Any] = {"id": "r", "model": model, "pose": list(pose)}
     if finish:
@@ -72,7 +74,7 @@ def hall(
             ],
             "margins": {"obstacle": margin_m},
             "goals": [
-                {"id": f"g{i}", "circle": {"center": list(at), "radius": 0.3}}
+                {"id": f"g{i}", "circle": {"center": list(at), "radius": radius_m}}
                 for i, at in enumerate(places)
             ],
             "battery": {"capacity_m": 300},
@@ -167,7 +169,21 @@ BAYED = [
 """Missions that end in a bay, beside the middle and the heading of the finish."""
 
 
-@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS, *BAYED])
+NOSED = [
+    hall(
+        (10.0, 5.3),
+        finish={"circle": {"center": [x, 6.0], "radius": 0.25}, "heading": heading},
+    )
+    for x, heading in ((14.35, 0.0), (14.28, 0.5))
+]
+"""Missions that end nose to a wall, where a car has room in a small part of a finish.
+"""
+
+TINY = hall((10.0, 5.1), (10.5, 6.9), model="diffdrive", radius_m=0.06)
+"""A mission whose goals are hardly wider than targets are deep."""
+
+
+@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS, *BAYED, *NOSED, TINY])
 def test_ways_keep_clear(scene: Scene) -> None:
     """Every footprint along a way, turns included, lies in free ground, by shapely."""
     _, path = way_of(scene)
@@ -222,7 +238,7 @@ def test_ways_turn_as_cars_do(scene: Scene) -> None:
     assert (turn <= between / radius_m + 1e-6).all()
 
 
-@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS, *BAYED])
+@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS, *BAYED, *NOSED, TINY])
 def test_ways_visit_targets_in_order(scene: Scene) -> None:
     """The nodes at stops lie in the targets' regions, and the last one ends the way."""
     problem, path = way_of(scene)
@@ -285,7 +301,7 @@ def test_long_tours_take_poses_by_the_target(monkeypatch: pytest.MonkeyPatch) ->
     assert looked_at[1] < 3 * looked_at[0]
 
 
-@pytest.mark.parametrize("scene", [MISSIONS[0], *OF_TURNERS, *BAYED])
+@pytest.mark.parametrize("scene", [MISSIONS[0], *OF_TURNERS, *BAYED, *NOSED])
 def test_driving_needs_no_smoothing(scene: Scene) -> None:
     """A way is driven as it is, to all of its targets."""
     problem, tour = stated(scene)

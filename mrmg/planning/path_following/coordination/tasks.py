@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import product
 from math import ceil, pi
 
@@ -98,13 +99,14 @@ def arrival_poses(problem: Problem, r: int, tour: Sequence[int]) -> np.ndarray:
     """Return (x, y, yaw) that robot r drives to at its legs' targets and its finish.
 
     That is the middle, and the heading that is wanted there; where the robot has no
-    room in that pose, the one in which it has most.
+    room in that pose, the one in which it has most, to the target's edge, too.
 
     Returns:
         Shape (L + 1, 3); 0 in the last row without a finish.
     """
     own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
-    enough_m, corner = own[0]["margin"] + END_SLACK_M, np.empty((MOST_CORNERS, 2))
+    margin_m, corner = float(own[0]["margin"]), np.empty((MOST_CORNERS, 2))
+    enough_m = margin_m + END_SLACK_M
     pose = np.zeros((len(tour) + int(problem.mission.targets.finish[r] < 0), 3))
     for i, target in enumerate(tour):
         poses = poses_at(problem.mission.targets, target)
@@ -113,7 +115,10 @@ def arrival_poses(problem: Problem, r: int, tour: Sequence[int]) -> np.ndarray:
             own, spaces, pose[i], enough_m, corner
         ):
             robot = problem.scene.robots[r]
-            best = roomiest_pose(problem.scene, robot, poses, enough_m)
+            most = partial(roomiest_pose, problem.scene, robot, poses, enough_m)
+            best = most(edge_m=margin_m)
+            if best is None or best.room_m < margin_m:  # it keeps less in an opening
+                best = most()
             pose[i] = best.pose if best else pose[i]
     return pose
 
