@@ -4,8 +4,9 @@ One or two kinds of robots, cars and unicycles, are drawn for each mission: thei
 outline, speeds and limits; then a map in proportion to the larger kind, 1 to 5 robots,
 2 to 11 goals, and by turns finishes, headings, stays, stations, terrain, scarce
 batteries and the makespan as objective. All places lie in one part of the free space,
-but nothing makes sure that there is a plan: rows without one count as failed. Protocol:
-that of `tools/bench`, one row a mission; the same number gives the same mission.
+but nothing makes sure that there is a plan: rows without one count as failed. Robots
+that are drawn have no MJCF, so that plans are verified but not driven. Protocol: that
+of `tools/bench`, one row a mission; the same number gives the same mission.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json are those of `tools/bench`.

@@ -167,7 +167,7 @@ def bottleneck(
         high_m: clearance with which there is no way.
     """
     widest_m = ground.widest_m(start, wanted, high_m)
-    if widest_m <= 0.0:
+    if widest_m <= WIDTH_ACCURACY_M:
         return None
     wider_m = widest_m + 4.0 * WIDTH_ACCURACY_M
     places = ground.narrows(start, wanted, widest_m, wider_m)

@@ -97,6 +97,16 @@ def test_no_way_leads_through_a_gap_narrower_than_the_car(
     )
 
 
+@pytest.mark.parametrize(
+    ("gap_m", "said"), [(0.2, "0.20 m wide near (15.0, 10.0)"), (0.004, "none at all")]
+)
+def test_the_widest_gap_is_named_unless_it_is_a_crack(
+    yard: MakeScene, gap_m: float, said: str
+) -> None:
+    proof = proof_of_infeasibility(yard(obstacles=wall_with_gap(gap_m)))
+    assert said in (proof or "")
+
+
 @pytest.mark.parametrize("gap_m", [CAR_WIDTH_M, 1.02 * CAR_WIDTH_M, 2.0])
 def test_nothing_is_proven_of_a_gap_as_wide_as_the_car(
     yard: MakeScene, gap_m: float
