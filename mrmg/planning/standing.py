@@ -60,9 +60,9 @@ class Room(NamedTuple):
 
     Attributes:
         pose: the best one known: (x [m], y [m], yaw [rad]), shape (3,).
-        room_m: how far the body is from obstacles there; -inf if it meets some, and no
-            pose is known in which it does not.
-        most_m: in no pose it is farther.
+        room_m: how far the body is from obstacles there, or the room to the region's
+            edge where that is less; -inf if no pose is known that meets no obstacle.
+        most_m: no pose has more.
     """
 
     pose: np.ndarray

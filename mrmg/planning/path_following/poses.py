@@ -134,7 +134,7 @@ def posed(
 def _gates(
     problem: Problem, r: int, tour: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (gates, gate, deeper) for robot r's targets, as `PoseSearch` has them."""
+    """Return (gates, gate, deeper) to robot r's targets: see `PoseSearch`, `Stops`."""
     targets, ends = problem.mission.targets, arrival_poses(problem, r, tour)
     gears = (1, -1) if problem.mission.fleet["limit"][r, 0] < 0.0 else (1,)
     gates, gate, deeper = list[tuple[float, ...]](), [0], list[float]()
