@@ -143,7 +143,25 @@ def pace(robot):
 
 
 @kernel
-def follow(own, course, i, state):
+def slowing(course, speed, last, way, dt):
+    """Return the speed after a step from which a robot slows down to the last one.
+
+    v dt / 2 + (v^2 - last^2) / (2 ease) is what the step leaves of the way.
+
+    Args:
+        course: whose deceleration it slows down with.
+        speed: at the beginning of the step [m/s].
+        last: at the end of the way [m/s].
+        way: from the beginning of the step [m].
+        dt: step [s].
+    """
+    lost = 0.5 * course.ease * dt
+    square = last * last + 2.0 * course.ease * (way - 0.5 * speed * dt) + lost * lost
+    return max(sqrt(max(square, 0.0)) - lost, 0.0)
+
+
+@kernel
+def follow(own, course, i, state, dt):
     """Return (segment, way, way left in this gear, off the path, wanted v and w)."""
     i, s = advance(course, i, state[0], state[1])
     ax, ay = course.node[i].x, course.node[i].y
@@ -161,14 +179,13 @@ def follow(own, course, i, state):
     askew = wrap(heading - tangent)
     left = course.node[course.node[i].end].way - s
     top = own[0].limit[1] if gear > 0 else -own[0].limit[0]
-    ease = course.ease
-    slow = pace(own[0])
-    v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + CREEPING * slow)
+    speed, slow = abs(state[3]), pace(own[0])
+    v = slowing(course, speed, 0.0, left - 0.5 * ARRIVED_M, dt) + CREEPING * slow
     near = max(course.node[i + 1].way - s, 0.0)
-    v = min(v, sqrt(course.node[i + 1].fastest ** 2 + 2.0 * ease * near))
-    ahead = s + max(abs(state[3]), PREVIEWED * slow) * PREVIEW_S
+    v = min(top, v, slowing(course, speed, course.node[i + 1].fastest, near, dt))
+    ahead = s + max(speed, PREVIEWED * slow) * PREVIEW_S
     bend = bend_at(course, i, ahead)
-    standing = abs(state[3]) < STANDING * slow
+    standing = speed < STANDING * slow
     stiffness = course.stiffness
     bend -= stiffness * stiffness * off + 2.0 * stiffness * sin(askew)
     if own[0].model == UNICYCLE:
@@ -212,7 +229,7 @@ def track_control(own, course, segment, stood, state, dt):
         return u1, u2, segment, stood, 0.0
     i, last, left, off, v, w = segment, 0, 0.0, 0.0, 0.0, 0.0
     if segment != START:
-        i, _, left, off, v, w = follow(own, course, segment, state)
+        i, _, left, off, v, w = follow(own, course, segment, state, dt)
         last = course.node[i].end
     if left < ARRIVED_M:
         angle = lacking(course, last, state)

@@ -227,6 +227,28 @@ def test_robots_that_brake_slowly_do_so_before_bends(
     assert driven.hausdorff_distance(shapely.LineString(nodes)) < 0.15
 
 
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("most_m_s2", [0.3, 1.0, 3.0])
+def test_robots_that_brake_hard_come_to_rest_where_their_paths_end(
+    model: str,
+    most_m_s2: float,
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+) -> None:
+    """A step earlier than braking seems due: it drives on as fast through each step."""
+    scene = yard(robots=[{"id": "r1", "model": model, "pose": [4, 10, 0]}])
+    robot = scene.robots[0]
+    limits = replace(robot.model.limits, v_max_m_s=2.0, u1_max_m_s2=most_m_s2)
+    robot = replace(robot, model=replace(robot.model, limits=limits))
+    problem = state(replace(scene, robots=(robot,)), samples=0)
+    problem = replace(problem, minimum_time=True)
+    for end_x in np.linspace(24.0, 25.0, 12):
+        drive = drive_alone(problem, 0, straight_path(problem, end_x))
+        assert drive.arrived
+        assert drive.motion.state[:, 3].max() > 1.6
+        assert -0.04 < drive.motion.state[-1, 0] - end_x < 0.01
+
+
 @pytest.mark.parametrize("share", [1.0, 0.15, 0.05])
 def test_robots_that_steer_slowly_come_back_to_their_paths(
     share: float, yard: Callable[..., Scene], state: Callable[..., Problem]
