@@ -20,7 +20,7 @@ from mrmg.planning.problem._control_kernels import (
 PREVIEW_S = 0.2
 """How far ahead the path's curvature is read."""
 
-ARRIVED_M = 0.03
+ARRIVED_M = 0.015
 """Way left at which a robot stops."""
 
 ALIGNED = 0.15
@@ -36,7 +36,7 @@ CREEPING, STANDING, PREVIEWED = 0.02, 0.05, 0.2
 """Speeds with which a robot arrives at least, below which it counts as standing, and
 with which the path is looked at ahead at least: in units of its `pace`."""
 
-TURNING_SHARE = 0.5
+TURNING_SHARE = 0.9
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 
@@ -130,34 +130,36 @@ def at_rest(course, segment, state):
 
 
 @kernel
-def turning_rate(own, angle):
-    """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
-    w = sqrt(2.0 * TURNING_SHARE * own[0].limit[4] * abs(angle))
-    return w if angle >= 0.0 else -w
+def slowing(speed, last, way, ease, dt):
+    """Return the speed v after a step from which a robot just slows down in time.
+
+    The step leaves what it takes to do so: way - (speed + v) dt / 2 is to be
+    (v^2 - last^2) / (2 ease).
+
+    Args:
+        speed: at the beginning of the step [m/s, or rad/s].
+        last: speed at the end of the way.
+        way: from the beginning of the step [m, or rad].
+        ease: deceleration [m/s^2, or rad/s^2].
+        dt: step [s].
+    """
+    lost = 0.5 * ease * dt
+    square = last * last + 2.0 * ease * (way - 0.5 * speed * dt) + lost * lost
+    return max(sqrt(max(square, 0.0)) - lost, 0.0)
+
+
+@kernel
+def turning_rate(own, angle, state, dt):
+    """Return the rate after a step of turning on the spot by an angle [rad/s]."""
+    side = 1.0 if angle >= 0.0 else -1.0
+    ease = TURNING_SHARE * own[0].limit[4]
+    return side * slowing(side * state[4], 0.0, abs(angle), ease, dt)
 
 
 @kernel
 def pace(robot):
     """Return the unit of low speeds: 1 m/s, or the robot's top speed if it is less."""
     return min(1.0, robot.limit[1])
-
-
-@kernel
-def slowing(course, speed, last, way, dt):
-    """Return the speed after a step from which a robot slows down to the last one.
-
-    v dt / 2 + (v^2 - last^2) / (2 ease) is what the step leaves of the way.
-
-    Args:
-        course: whose deceleration it slows down with.
-        speed: at the beginning of the step [m/s].
-        last: at the end of the way [m/s].
-        way: from the beginning of the step [m].
-        dt: step [s].
-    """
-    lost = 0.5 * course.ease * dt
-    square = last * last + 2.0 * course.ease * (way - 0.5 * speed * dt) + lost * lost
-    return max(sqrt(max(square, 0.0)) - lost, 0.0)
 
 
 @kernel
@@ -180,9 +182,10 @@ def follow(own, course, i, state, dt):
     left = course.node[course.node[i].end].way - s
     top = own[0].limit[1] if gear > 0 else -own[0].limit[0]
     speed, slow = abs(state[3]), pace(own[0])
-    v = slowing(course, speed, 0.0, left - 0.5 * ARRIVED_M, dt) + CREEPING * slow
+    v = slowing(speed, 0.0, left, course.ease, dt) + CREEPING * slow
     near = max(course.node[i + 1].way - s, 0.0)
-    v = min(top, v, slowing(course, speed, course.node[i + 1].fastest, near, dt))
+    fastest = course.node[i + 1].fastest
+    v = min(top, v, slowing(speed, fastest, near, course.ease, dt))
     ahead = s + max(speed, PREVIEWED * slow) * PREVIEW_S
     bend = bend_at(course, i, ahead)
     standing = speed < STANDING * slow
@@ -194,7 +197,7 @@ def follow(own, course, i, state, dt):
         w = bend * v
         if abs(askew) > (ASKEW if standing else FAR_ASKEW):
             v = 0.0
-            w = turning_rate(own, -askew)
+            w = turning_rate(own, -askew, state, dt)
     else:
         w = atan(gear * own[0].wheelbase * bend)
     w = max(-own[0].limit[2], min(own[0].limit[2], w))
@@ -225,7 +228,8 @@ def track_control(own, course, segment, stood, state, dt):
         if angle == 0.0:
             u1, u2 = braking_control(own, 0, state, dt)
             return u1, u2, segment, stood, 0.0
-        u1, u2 = control_towards(own, 0, state, 0.0, turning_rate(own, angle), dt)
+        w = turning_rate(own, angle, state, dt)
+        u1, u2 = control_towards(own, 0, state, 0.0, w, dt)
         return u1, u2, segment, stood, 0.0
     i, last, left, off, v, w = segment, 0, 0.0, 0.0, 0.0, 0.0
     if segment != START:
@@ -235,7 +239,7 @@ def track_control(own, course, segment, stood, state, dt):
         angle = lacking(course, last, state)
         v = 0.0
         if own[0].model == UNICYCLE:
-            w = turning_rate(own, angle) if abs(state[3]) < REST else 0.0
+            w = turning_rate(own, angle, state, dt) if abs(state[3]) < REST else 0.0
         if angle == 0.0 and stands(own, 0, state):
             stood += 1
             if stood > course.node[last].pause:

@@ -136,11 +136,11 @@ def test_halted_it_hands_back_what_it_was_given(mission: Refined) -> None:
 def test_a_straight_drive_comes_near_to_its_distance(
     yard: Callable[..., Scene],
 ) -> None:
-    """22 m to the centre of the goal, whose edge is 1.3 m nearer, and no braking."""
+    """22 m to the centre of the goal, whose edge is 1.5 m nearer, and no braking."""
     scene = yard()
     one = refined(scene)
     metre_J = scene.robots[0].model.energy_model.plain_ground_J_per_m()
-    assert 20.7 <= one.after.cost_J / metre_J < 21.1
+    assert 20.5 <= one.after.cost_J / metre_J < 20.8
 
 
 def test_a_goal_behind_obstacles_is_met_at_the_margin(

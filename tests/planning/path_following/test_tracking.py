@@ -137,6 +137,37 @@ def test_a_drive_ends_at_rest_with_the_heading_asked_for(
     assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance
 
 
+@pytest.mark.parametrize("angle", [0.3, 1.0, 1.5, 3.0])
+def test_robots_turn_on_the_spot_nearly_as_fast_as_they_can(
+    angle: float, yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Closed form: they gather speed for half of the angle, up to the most, and lose it
+    again. None is lost by turning too far.
+    """
+    finish = {"circle": {"center": [25, 10], "radius": 1}, "heading": angle}
+    robot = {"id": "r1", "model": "diffdrive", "pose": [25, 10, 0], "finish": finish}
+    problem = state(yard(robots=[robot]))
+    end = int(problem.mission.targets.finish[0])
+    path = Path(
+        node=np.array([[25.0, 10.0]]),
+        gear=np.zeros(0, np.int64),
+        heading=0.0,
+        stop=np.array([0]),
+        target=np.array([end]),
+        deeper=np.zeros(1),
+        pause_s=np.zeros(1),
+        aim=np.array([angle]),
+    )
+    drive = drive_alone(problem, 0, path)
+    assert drive.arrived
+    assert drive.motion.state[:, 4].min() >= -0.05
+    limit = problem.mission.fleet["limit"][0]
+    most = min(limit[2], np.sqrt(angle * limit[4]))
+    least_s = angle / most + most / limit[4]
+    taken_s = len(drive.motion.control) * problem.dt_s
+    assert taken_s <= 1.1 * least_s + 3.0 * problem.dt_s
+
+
 def test_robots_that_turn_on_the_spot_turn_to_headings_on_their_way(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
@@ -246,7 +277,7 @@ def test_robots_that_brake_hard_come_to_rest_where_their_paths_end(
         drive = drive_alone(problem, 0, straight_path(problem, end_x))
         assert drive.arrived
         assert drive.motion.state[:, 3].max() > 1.6
-        assert -0.04 < drive.motion.state[-1, 0] - end_x < 0.01
+        assert -0.02 < drive.motion.state[-1, 0] - end_x < 0.01
 
 
 @pytest.mark.parametrize("share", [1.0, 0.15, 0.05])
