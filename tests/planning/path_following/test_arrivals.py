@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
+import numpy as np
 import pytest
 
 import mrmg
@@ -98,6 +99,12 @@ def found(scene: Scene) -> mrmg.Plan:
     return result.plan
 
 
+def driven_m(plan: mrmg.Plan) -> float:
+    """Return how far the only robot drives."""
+    (trajectory,) = plan.trajectories
+    return float(np.hypot(*np.diff(trajectory.state[:, :2], axis=0).T).sum())
+
+
 @pytest.mark.parametrize("goals", [((15, 10), (24, 10)), ((12, 4), (20, 14))])
 @pytest.mark.parametrize("heading", HEADINGS)
 def test_final_headings_take_no_search(
@@ -137,11 +144,13 @@ def test_many_goals_at_one_place_have_their_headings(model: str) -> None:
 @pytest.mark.parametrize("model", ["car", "diffdrive"])
 @pytest.mark.parametrize("dwell_s", [0.0, 5.0])
 def test_robots_stay_and_turn_where_they_begin(model: str, dwell_s: float) -> None:
-    """At a goal that they are in; a unicycle has its heading to turn to as well."""
+    """At a goal that they are in; a unicycle has its heading to turn to as well.
+
+    None drives a loop for it. Once turned, a unicycle may well go on backwards.
+    """
     scene = yard(None, (6.2, 10.0), (24.0, 10.0), model=model)
     goal = {**scene.document["goals"][0], "dwell": dwell_s}
     if model == "diffdrive":
         goal["heading"] = 2.0
     staying = scene_from_document({**scene.document, "goals": [goal]}, source="yard")
-    plan = found(staying)
-    assert plan.makespan_s < found(scene).makespan_s + dwell_s + 8.0
+    assert driven_m(found(staying)) < driven_m(found(scene)) + 1.5
