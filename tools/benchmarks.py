@@ -45,7 +45,7 @@ COMMANDS = {
     "headings_car": "bench_headings --yards 0-31 --execute",
     "headings_diffdrive": "bench_headings --model diffdrive --yards 0-31 --execute",
     "bays_car": "bench_headings --bays 3 --yards 0-31 --execute",
-    "random": "bench_random --missions 1000-1099",
+    "random": "bench_random --missions 2000-2099",
     "clmapf": "bench_clmapf --seeds 0-2",
     "kinodynamic": "bench_kinodynamic",
     "routing": "bench_routing",
