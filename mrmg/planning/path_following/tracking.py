@@ -26,7 +26,7 @@ LEAST_STEPS, BRAKINGS = 400, 4.0
 """Steps that driving may take in any case, or times as long as braking from full speed
 takes for each stretch of the path."""
 
-COASTING_SHARE = 0.95
+COASTING_SHARE = 0.91
 """Share of rolling resistance's deceleration that robots slow down with."""
 
 TURNING_SHARE = 0.3
