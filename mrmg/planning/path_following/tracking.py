@@ -27,7 +27,8 @@ LEAST_STEPS, BRAKINGS = 400, 4.0
 takes for each stretch of the path."""
 
 COASTING_SHARE = 0.91
-"""Share of rolling resistance's deceleration that robots slow down with."""
+"""Share of rolling resistance's deceleration that robots slow down with. The rest is
+traction: with too little of it, simulated drives push and brake by turns."""
 
 TURNING_SHARE = 0.3
 """The same for robots that turn by their wheels' speeds: nearly without traction one
