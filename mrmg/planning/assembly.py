@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
+from math import inf
+from typing import NamedTuple
 
 from mrmg import extensions
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
@@ -18,13 +20,25 @@ from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan, Trajectory, Visit
 
 
+class Refusal(NamedTuple):
+    """Why trajectories are no plan; the least is that of which least is missing.
+
+    Attributes:
+        missing_J: what a battery is short of; inf if that is not why.
+        why: in words.
+    """
+
+    missing_J: float
+    why: str
+
+
 def make_plan(
     problem: Problem,
     seed: int,
     params: PlannerParams,
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
-) -> tuple[Plan | None, str]:
+) -> tuple[Plan | None, Refusal | None]:
     """Return the plan of trajectories, or None and why exact accounting refuses it.
 
     Kernels meter terrain on a grid; the ledger uses the exact areas.
@@ -43,22 +57,23 @@ def make_plan(
         robot, tour = scene.robot(trajectory.robot), tours[trajectory.robot]
         own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
         if len(own) < len(tour):
-            return None, f"{robot.id} misses {tour[len(own)]}"
+            return None, Refusal(inf, f"{robot.id} misses {tour[len(own)]}")
         battery = robot.battery
         least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
         missing_J = least_J - content_J.min()
         if missing_J > 0.0:
             less = energy_and_metres(missing_J, robot)
-            return None, f"{robot.id} ends {less} short of what its battery must keep"
+            why = f"{robot.id} ends {less} short of what its battery must keep"
+            return None, Refusal(missing_J, why)
         visits += own
         entries += drawn
     ways = {item.robot: item.state[:, :2] for item in trajectories}
     if any(crowded_stations(scene, ways)):
-        return None, "two robots are at a station for one at a time"
+        return None, Refusal(inf, "two robots are at a station for one at a time")
     visited = {visit.target for visit in visits}
     left_out = [goal.id for goal in scene.goals if goal.id not in visited]
     if left_out:
-        return None, f"nobody visits {listed(left_out)}"
+        return None, Refusal(inf, f"nobody visits {listed(left_out)}")
     plan = Plan(
         scene_name=scene.name,
         scene_digest=scene.digest,
@@ -77,7 +92,7 @@ def make_plan(
         visits=tuple(sorted(visits, key=lambda visit: (visit.step, visit.robot))),
         ledger=EnergyLedger(tuple(entries)),
     )
-    return plan, ""
+    return plan, None
 
 
 @cache

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mrmg import seeding
-from mrmg.planning.assembly import make_plan
+from mrmg.planning.assembly import Refusal, make_plan
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routers import Router, solve
@@ -86,7 +86,8 @@ class Attempt:
         counts: of what was done, such as fleets driven along tours, searches for
             motions and router calls.
         tours_found: whether the router found any.
-        blocked: what stood in the way of a plan along them; "" if nothing did.
+        blocked: what stood in the way of motions along them; "" if nothing did.
+        refused: why motions along them are no plan, of those that are nearest to one.
     """
 
     plans: Sequence[Plan] = ()
@@ -95,6 +96,7 @@ class Attempt:
     counts: Mapping[str, int] = field(default_factory=dict)
     tours_found: bool = True
     blocked: str = ""
+    refused: Refusal | None = None
 
     def after(self, failed: Attempt) -> Attempt:
         """Return this attempt with what one before it has found out."""
@@ -104,4 +106,10 @@ class Attempt:
             counts=Counter(failed.counts) + Counter(self.counts),
             tours_found=failed.tours_found or self.tours_found,
             blocked=self.blocked or failed.blocked,
+            refused=least_refusal(self.refused, failed.refused),
         )
+
+
+def least_refusal(*refusals: Refusal | None) -> Refusal | None:
+    """Return that of some refusals of which least is missing; None if there is none."""
+    return min(filter(None, refusals), default=None)

@@ -20,7 +20,8 @@ import numpy as np
 from mrmg import interruption
 from mrmg.background import finished, in_background
 from mrmg.counted import counted
-from mrmg.planning.attempt import Attempt
+from mrmg.planning.assembly import Refusal
+from mrmg.planning.attempt import Attempt, least_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.statistics import Improvement, Statistics
@@ -58,7 +59,9 @@ class Search:
         begun: number of attempts that were begun.
         attempts: number of those that have ended.
         tours_found: whether the router found tours in any of them.
-        blocked: what stood in the way of the last plan along tours; "" if nothing did.
+        blocked: what stood in the way of the last motions along tours; "" if nothing
+            did.
+        refused: why motions along tours are no plan, of those nearest to one.
         interrupted: whether an interrupt ended the search.
     """
 
@@ -76,6 +79,7 @@ class Search:
     attempts: int = 0
     tours_found: bool = False
     blocked: str = ""
+    refused: Refusal | None = None
     interrupted: bool = False
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
 
@@ -98,6 +102,7 @@ class Search:
                 self.attempts += 1
                 self.tours_found |= attempt.tours_found
                 self.blocked = attempt.blocked or self.blocked
+                self.refused = least_refusal(attempt.refused, self.refused)
                 self.statistics.add(dict(attempt.counts), attempt.routing_s)
                 times = attempt.found_at or repeat(time.perf_counter())
                 plans = zip(times, attempt.plans, strict=False)

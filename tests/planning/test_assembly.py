@@ -25,7 +25,7 @@ def assembled(scene: Scene, plan: Plan, soc_margin: float = 0.0) -> Plan | str:
     problem: Any = SimpleNamespace(scene=scene, soc_margin=soc_margin)
     params, ways = PlannerParams(), plan.trajectories
     made, refusal = make_plan(problem, 3, params, ways, plan.tours)
-    return made or refusal
+    return made or refusal.why
 
 
 def test_trajectories_that_keep_every_rule_are_a_plan(case: Any) -> None:

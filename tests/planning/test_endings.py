@@ -232,6 +232,14 @@ ROWS = (
         NARROW,
     ),
     Row(
+        "REFUSED",
+        {
+            "goals": [{**circle("g", 15, 10, 1.0), "heading": 3.1416}],
+            "battery": {"capacity_m": 12, "reserve": 0.0},
+        },
+        ("r1 ends", "m of plain ground) short of what its battery must keep"),
+    ),
+    Row(
         "HEADINGS",
         LANE,
         ("the finish of r1 with the heading wanted", "heading_tolerance"),

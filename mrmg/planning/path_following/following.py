@@ -16,7 +16,7 @@ from math import radians
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE, USER
-from mrmg.planning.assembly import make_plan
+from mrmg.planning.assembly import Refusal, make_plan
 from mrmg.planning.attempt import Request
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.arrivals import with_arrivals
@@ -64,7 +64,8 @@ class Followed:
 
     Attributes:
         plan: along them, None if there is none.
-        failure: why there is none, in words.
+        failure: why they could not be driven, in words.
+        refused: why driving them gave no plan.
         driven: whether they could be driven, if not on the charge there is.
         led: whether a path led any robot.
         took: what driving took, if that gave no plan.
@@ -72,6 +73,7 @@ class Followed:
 
     plan: Plan | None
     failure: str = ""
+    refused: Refusal | None = None
     driven: bool = True
     led: bool = True
     took: Driven = field(default_factory=Driven)
@@ -111,13 +113,13 @@ def follow_tours(
     if not trajectories:
         led = any(len(task.path.target) > 0 for task in tasks)
         return Followed(None, failure, driven=False, led=led)
-    plan, refusal = make_plan(
+    plan, refused = make_plan(
         problem, request.seed, request.params, trajectories, tours
     )
     if plan is not None:
         return Followed(plan)
     took = what_driving_took(problem, trajectories, tours)
-    return Followed(None, refusal, took=took)
+    return Followed(None, refused=refused, took=took)
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:

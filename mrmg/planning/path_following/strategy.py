@@ -9,11 +9,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
 
-from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.assembly import make_plan
+from mrmg.planning.attempt import Attempt, Request, least_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import rounds_of
@@ -175,10 +177,11 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
     tours = problem.visits(routing.tours)
     plans: list[Plan] = []
     found_at = []
-    plan = request.plan(problem, trajectories, tours) if trajectories else None
-    if trajectories and plan is None:  # batteries may suffice along smoother paths
+    made = partial(make_plan, problem, request.seed, request.params, tours=tours)
+    plan, refused = made(trajectories) if trajectories else (None, None)
+    if refused:  # batteries may suffice along smoother paths
         smooth = along_trajectories(problem, targets, trajectories, request.halt)
-        plan = request.plan(problem, smooth, tours) if smooth else None
+        plan, refused = made(smooth) if smooth else (None, refused)
     left = request.params.refinements
     while plan is not None:
         plans.append(plan)
@@ -192,7 +195,7 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
     counts = {"coordinated": 1, "router_calls": 1}
-    return Attempt(plans, found_at, routing_s, counts)
+    return Attempt(plans, found_at, routing_s, counts, refused=refused)
 
 
 def follow_paths(
@@ -221,7 +224,7 @@ def follow_paths(
     preference = problem.preference
     plans: list[Plan] = []
     found_at: list[float] = []
-    failure, driven = "", 0
+    blocked, refused, driven = "", None, 0
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
             break
@@ -238,7 +241,8 @@ def follow_paths(
         learnt.met |= followed.failure == ROBOTS_MEET
         learnt.searched |= learnt.met and not followed.led
         learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
-        plan, failure = followed.plan, followed.failure or failure
+        plan, blocked = followed.plan, followed.failure or blocked
+        refused = least_refusal(refused, followed.refused)
         learnt.took.update(followed.took)
         if plan is not None and (
             not plans or preference.rank(plan) < preference.rank(plans[-1])
@@ -246,4 +250,4 @@ def follow_paths(
             plans.append(plan)
             found_at.append(time.perf_counter())
     counts = {"path_following_plans": driven, "router_calls": calls}
-    return Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
+    return Attempt(plans, found_at, routing_s, counts, bool(choice), blocked, refused)
