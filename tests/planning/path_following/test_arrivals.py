@@ -146,11 +146,15 @@ def test_many_goals_at_one_place_have_their_headings(model: str) -> None:
 def test_robots_stay_and_turn_where_they_begin(model: str, dwell_s: float) -> None:
     """At a goal that they are in; a unicycle has its heading to turn to as well.
 
-    None drives a loop for it. Once turned, a unicycle may well go on backwards.
+    None drives a loop for it, and none takes much longer than its way in its slower
+    gear: once turned, a unicycle may well go on backwards.
     """
     scene = yard(None, (6.2, 10.0), (24.0, 10.0), model=model)
     goal = {**scene.document["goals"][0], "dwell": dwell_s}
     if model == "diffdrive":
         goal["heading"] = 2.0
     staying = scene_from_document({**scene.document, "goals": [goal]}, source="yard")
-    assert driven_m(found(staying)) < driven_m(found(scene)) + 1.5
+    plan, limits = found(staying), staying.robots[0].model.planned_limits
+    assert driven_m(plan) < driven_m(found(scene)) + 1.5
+    slowest_m_s = min(limits.v_max_m_s, -limits.v_min_m_s)
+    assert plan.makespan_s < driven_m(plan) / slowest_m_s + dwell_s + 10.0
