@@ -217,8 +217,9 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
         )
-    if search.refused:  # neither headings nor room stood in the way of motions
-        return endings.REFUSED.format(refused=search.refused.why)
+    if search.refused:  # neither headings nor room stood in the way of these motions
+        blocked = f"; with others, {search.blocked}" if search.blocked else ""
+        return endings.REFUSED.format(refused=search.refused.why, blocked=blocked)
     rounds = search.statistics.counts.get("coordinated", 0)
     searched = f", and {counted(rounds, 'search', 'searches')} for motions found none"
     searched = searched if rounds else ""

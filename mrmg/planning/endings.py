@@ -74,7 +74,7 @@ LATE = (
     "time limit is {limit_s:g} s, and {margin_s:g} s of it are kept for execution"
 )
 NO_PROGRESS = "tours were found, but no plan along them: {blocked}{searched}"
-REFUSED = "tours and motions along them were found, but {refused}"
+REFUSED = "tours and motions along them were found, but {refused}{blocked}"
 HEADINGS = (
     "tours were found, but no motions along them that get to {places} with the heading "
     "wanted there{searched}; without headings there are some: other headings, a larger "
