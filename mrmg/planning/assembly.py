@@ -18,6 +18,7 @@ from mrmg.planning.feasibility import energy_and_metres
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan, Trajectory, Visit
+from mrmg.scene.types import Robot
 
 
 class Refusal(NamedTuple):
@@ -58,13 +59,9 @@ def make_plan(
         own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
         if len(own) < len(tour):
             return None, Refusal(inf, f"{robot.id} misses {tour[len(own)]}")
-        battery = robot.battery
-        least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
-        missing_J = least_J - content_J.min()
-        if missing_J > 0.0:
-            less = energy_and_metres(missing_J, robot)
-            why = f"{robot.id} ends {less} short of what its battery must keep"
-            return None, Refusal(missing_J, why)
+        short = _short(robot, content_J.min(), problem.soc_margin)
+        if short is not None:
+            return None, short
         visits += own
         entries += drawn
     ways = {item.robot: item.state[:, :2] for item in trajectories}
@@ -93,6 +90,18 @@ def make_plan(
         ledger=EnergyLedger(tuple(entries)),
     )
     return plan, None
+
+
+def _short(robot: Robot, least_J: float, soc_margin: float) -> Refusal | None:
+    """Return what a battery's least content lacks of reserve and margin, or None."""
+    battery = robot.battery
+    missing_J = battery.reserve_J + soc_margin * battery.capacity_J - least_J
+    if missing_J <= 0.0:
+        return None
+    less = energy_and_metres(missing_J, robot)
+    return Refusal(
+        missing_J, f"{robot.id} ends {less} short of what its battery must keep"
+    )
 
 
 @cache
