@@ -71,7 +71,16 @@ class Request:
             trajectories: of all robots, equally long, each at rest in the end.
             tours: ids of the targets that each robot visits, in order.
         """
-        return make_plan(problem, self.seed, self.params, trajectories, tours)[0]
+        return self.plan_or_refusal(problem, trajectories, tours)[0]
+
+    def plan_or_refusal(
+        self,
+        problem: Problem,
+        trajectories: Sequence[Trajectory],
+        tours: Mapping[str, tuple[str, ...]],
+    ) -> tuple[Plan | None, Refusal | None]:
+        """Return what `plan` does, or None and why exact accounting refuses it."""
+        return make_plan(problem, self.seed, self.params, trajectories, tours)
 
 
 @dataclass(frozen=True, slots=True)

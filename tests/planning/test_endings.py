@@ -15,7 +15,10 @@ import mrmg
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode, SceneError
 from mrmg.planning import PlannerParams, endings
+from mrmg.planning.assembly import Refusal
+from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.endings import listed
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import PlanStatus
 from mrmg.scene.loading import dump_scene
 from mrmg.scene.types import Scene
@@ -281,6 +284,25 @@ def test_a_battery_that_lacks_little_does_not_lack_nothing(yard: MakeScene) -> N
     battery = {"capacity_m": 0.997 * least_m, "reserve": 0.0}
     reason = mrmg.plan(yard(**{**row.changes, "battery": battery})).reason
     assert reason.endswith("would have to hold at least slightly more usable energy")
+
+
+def test_the_motions_nearest_to_a_plan_are_told_and_what_stopped_others(
+    yard: MakeScene,
+) -> None:
+    refused = [
+        Refusal(missing_J, f"lacks {missing_J:.0f} J") for missing_J in (7, 3, 5)
+    ]
+
+    def planner(problem: Problem, request: Request) -> Attempt:
+        earlier = Attempt(refused=refused[request.number])
+        return Attempt(blocked="r1 is stuck", refused=Refusal(9, "no")).after(earlier)
+
+    params = PlannerParams(trees=len(refused))
+    reason = mrmg.plan(yard(), params=params, planner=planner).reason
+    told = endings.REFUSED.format(
+        refused="lacks 3 J", blocked="; with others, r1 is stuck"
+    )
+    assert reason == told
 
 
 def test_every_sentence_has_its_row() -> None:

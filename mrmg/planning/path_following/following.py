@@ -16,7 +16,7 @@ from math import radians
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE, USER
-from mrmg.planning.assembly import Refusal, make_plan
+from mrmg.planning.assembly import Refusal
 from mrmg.planning.attempt import Request
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.arrivals import with_arrivals
@@ -113,9 +113,7 @@ def follow_tours(
     if not trajectories:
         led = any(len(task.path.target) > 0 for task in tasks)
         return Followed(None, failure, driven=False, led=led)
-    plan, refused = make_plan(
-        problem, request.seed, request.params, trajectories, tours
-    )
+    plan, refused = request.plan_or_refusal(problem, trajectories, tours)
     if plan is not None:
         return Followed(plan)
     took = what_driving_took(problem, trajectories, tours)

@@ -9,12 +9,10 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import product
 
 import numpy as np
 
-from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt, Request, least_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import coordinated
@@ -177,11 +175,14 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
     tours = problem.visits(routing.tours)
     plans: list[Plan] = []
     found_at = []
-    made = partial(make_plan, problem, request.seed, request.params, tours=tours)
-    plan, refused = made(trajectories) if trajectories else (None, None)
+    plan, refused = None, None
+    if trajectories:
+        plan, refused = request.plan_or_refusal(problem, trajectories, tours)
     if refused:  # batteries may suffice along smoother paths
         smooth = along_trajectories(problem, targets, trajectories, request.halt)
-        plan, refused = made(smooth) if smooth else (None, refused)
+        if smooth:
+            plan, other = request.plan_or_refusal(problem, smooth, tours)
+            refused = least_refusal(refused, other)
     left = request.params.refinements
     while plan is not None:
         plans.append(plan)
