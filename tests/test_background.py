@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import threading
+import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.planner import plan_mission
+from mrmg.planning.problem.problem import state_mission, tightened
 from mrmg.planning.statistics import Bounds, Statistics
 from mrmg.plans import PlanStatus
 from mrmg.scene.loading import load_scene
@@ -56,6 +59,12 @@ def test_a_halted_proof_is_given_up() -> None:
         proof_of_infeasibility(load_scene("quickstart"), SET)
 
 
+@pytest.mark.parametrize("build", [state_mission, tightened])
+def test_a_halted_roadmap_is_given_up(build: Callable[..., object]) -> None:
+    with pytest.raises(Halted):
+        build(load_scene("quickstart"), 0, PlannerParams(), SET)
+
+
 def test_coarse_bounds_come_first_and_better_ones_replace_them() -> None:
     statistics, scene = Statistics(), load_scene("quickstart")
     bounds_beside(scene, 0.1, statistics, anytime=True, halt=NEVER).result()
@@ -83,13 +92,19 @@ def test_a_plan_does_not_wait_for_its_bound_beyond_the_budget(
     assert result.statistics["gap"] is None
 
 
-def test_a_roadmap_that_takes_too_long_is_no_plan(
+def test_a_roadmap_that_takes_too_long_is_no_plan_and_is_given_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    never = threading.Event()
-    monkeypatch.setattr(planner, "state_mission", lambda *_: never.wait())
+    given_up = threading.Event()
+
+    def endless(*args: np.ndarray) -> None:
+        while not args[-1][0]:
+            time.sleep(0.01)
+        given_up.set()
+
+    monkeypatch.setattr(planner, "state_mission", endless)
     result = plan_mission(load_scene("quickstart"), params=PlannerParams(budget_s=0.1))
-    never.set()
+    assert given_up.wait(60.0)
     assert result.plan is None
     assert result.status is PlanStatus.TIMEOUT
     assert "the budget of 0.1 s was over before" in result.reason

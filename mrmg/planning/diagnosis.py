@@ -260,7 +260,7 @@ def _headings_in_the_way(scene: Scene, request: Request) -> list[str]:
     )
     frame = Frame.of(free, request.params.margins)
     params = frame.params(request.params)
-    problem = state_mission(frame.scene(free), request.seed, params)
+    problem = state_mission(frame.scene(free), request.seed, params, request.halt)
     found = path_following(problem, request)
     return goals + [f"the finish of {name}" for name in headed] if found.plans else []
 

@@ -193,8 +193,9 @@ class _Planning:
         for robot in own.robots:
             motion_addresses(robot.model)
         self.statistics.begin(self.spent_s)
-        proofs = Proofs(self.scene, self.params.dt_s, self.request.halt)
-        problem = self._in_time(partial(state_mission, own, self.request.seed, params))
+        seed, halt = self.request.seed, self.request.halt
+        proofs = Proofs(self.scene, self.params.dt_s, halt)
+        problem = self._in_time(partial(state_mission, own, seed, params, halt))
         self.statistics.time_s["init"] = self.statistics.elapsed()
         if problem is None:
             proof = self._in_time(partial(proofs.reason, tours_missing=False))
@@ -283,7 +284,7 @@ class _Planning:
             own = self.frame.params(self.params).margins
             near = with_least_spacing(problem.scene, own)
             bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
-            tighter = tightened(near, self.request.seed, bare)
+            tighter = tightened(near, self.request.seed, bare, self.request.halt)
             # Plans are of the scene as it is.
             return tighter and replace(tighter, scene=problem.scene)
 

@@ -101,6 +101,8 @@ def follow_tours(
     timed = problem.minimum_time or time_counts(problem.scene)
     tasks = []
     for r, (tour, cost_map) in enumerate(zip(stops, cost_maps, strict=True)):
+        if request.halted:
+            return Followed(None, driven=False)
         # The search for motions nearly always finds a curve to a single target with a
         # heading at once; along paths there are cheaper ones, which take longer.
         ahead = [] if first and is_one_pose(problem, r, tour) else tour

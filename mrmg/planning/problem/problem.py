@@ -11,6 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import CAR, write_states
+from mrmg.planning.halting import NEVER
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.problem._region_kernels import Zones
@@ -250,14 +251,19 @@ ROADMAPS = 3
 """Roadmaps built at most, each with three times the samples, to join all goals."""
 
 
-def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+def state_mission(
+    scene: Scene, seed: int, params: PlannerParams, halt: np.ndarray = NEVER
+) -> Problem:
     """Build the roadmap, denser while it does not join all goals, and the problem.
 
     Robots keep less than their margins on ways to targets that it does not join with
     them, and about starts that are nearer to obstacles.
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
     """
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
-    problem = _joined(scene, seed, params, world)
+    problem = _joined(scene, seed, params, world, halt)
     lacking = unjoined(scene, problem.roadmap)
     fleet, spaces = problem.mission.fleet, problem.mission.spaces
     cramped = cramped_starts(fleet, spaces, problem.start)
@@ -266,33 +272,44 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
         *openings_at_starts(scene, params.margins, beside_walls),
         *openings_to(scene, params.margins, lacking),
     )
-    return _opened(scene, seed, params, openings) if openings else problem
+    return _opened(scene, seed, params, openings, halt) if openings else problem
 
 
-def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem | None:
+def tightened(
+    scene: Scene, seed: int, params: PlannerParams, halt: np.ndarray = NEVER
+) -> Problem | None:
     """Return the problem with the certified minimum in all narrow ground.
 
     Where robots have to turn they may need it though they get through without. A robot
     alone on wide ground has nothing to gain: None.
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
     """
     openings = tightest_openings(scene, params.margins)
     alone = len(scene.robots) == 1 and not openings
-    return None if alone else _opened(scene, seed, params, openings)
+    return None if alone else _opened(scene, seed, params, openings, halt)
 
 
 def _opened(
-    scene: Scene, seed: int, params: PlannerParams, openings: tuple[Opening, ...]
+    scene: Scene,
+    seed: int,
+    params: PlannerParams,
+    openings: tuple[Opening, ...],
+    halt: np.ndarray,
 ) -> Problem:
     """Return the problem with openings."""
     fine_m = cell_m(scene, params.margins, LEAST_CELL_M)
     world = World.from_scene(
         scene, cell_m=fine_m, openings=openings, guide_m=guide_m(fine_m)
     )
-    opened = _joined(scene, seed, params, world)
+    opened = _joined(scene, seed, params, world, halt)
     return replace(opened, openings=openings)
 
 
-def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Problem:
+def _joined(
+    scene: Scene, seed: int, params: PlannerParams, world: World, halt: np.ndarray
+) -> Problem:
     """Return the problem with the first roadmap of several that joins all goals."""
     priced = priced_world(scene, world)
     samples = params.samples
@@ -304,6 +321,7 @@ def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Pro
             neighbours=params.neighbours,
             margins=params.margins,
             rng=seeding.stream(seed, "roadmap", attempt),
+            halt=halt,
         )
         if not any(t < len(scene.goals) for _, t in unjoined(scene, roadmap)):
             break

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap import _roadmap_kernels
 from mrmg.planning.roadmap._bucket_kernels import Buckets, nearest_vertices
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
@@ -108,6 +109,7 @@ def build_roadmap(
     neighbours: int,
     margins: Margins,
     rng: np.random.Generator,
+    halt: np.ndarray = NEVER,
 ) -> Roadmap:
     """Build the roadmap of a scene.
 
@@ -118,6 +120,7 @@ def build_roadmap(
         neighbours: number of nearest vertices each vertex is joined to.
         margins: stated for all robots; each one's own count where they state none.
         rng: source of the samples.
+        halt: shape (1,); raises Halted once it has turned true.
     """
     classes, class_of_robot = travel_classes(scene, world, margins)
     n_targets = len(planned_regions(scene))
@@ -134,18 +137,17 @@ def build_roadmap(
     ends = _candidate_edges(vertex, neighbours)
     edges, cost, successor, energy, distance = zip(
         *(
-            _cheapest_paths(scene, world, one, vertex, ends, leaving, height_m)
+            _cheapest_paths(scene, world, one, vertex, ends, leaving, height_m, halt)
             for one in classes
         ),
         strict=True,
     )
-    slopes = [one.slope for one in classes]
     return Roadmap(
         arrays=RoadmapArrays(
             vertex=vertex,
             cost_to_go=_stacked(cost),
             successor=_stacked(successor),
-            slope_refund=np.array([slope.refund for slope in slopes]),
+            slope_refund=np.array([one.slope.refund for one in classes]),
             buckets=_buckets(vertex, scene.bounds[:2], scene.bounds[2:], BUCKET_M),
         ),
         distance=np.array(distance).reshape(len(classes), n_targets, n_targets),
@@ -182,6 +184,7 @@ def _cheapest_paths(
     ends: tuple[np.ndarray, np.ndarray],
     leaving: tuple[np.ndarray, np.ndarray],
     height_m: np.ndarray | None,
+    halt: np.ndarray,
 ) -> tuple[
     tuple[np.ndarray, ...], np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]
 ]:
@@ -208,6 +211,7 @@ def _cheapest_paths(
     cost = np.empty((len(entries), len(vertex)))
     successor = np.empty(cost.shape, np.int32)
     for t, own in enumerate(entries):
+        check(halt)
         cost[t], before, _ = dijkstra(
             backwards, indices=own, min_only=True, return_predecessors=True
         )

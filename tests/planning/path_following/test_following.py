@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.motion._kernels import USER
 from mrmg.planning import PlannerParams, Request
+from mrmg.planning.path_following import following
+from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
@@ -43,6 +46,23 @@ def test_plans_along_tours_are_valid_and_the_same_again(name: str) -> None:
     plan = followed(scene)
     assert mrmg.verify(scene, plan).violations == ()
     assert followed(scene).digest == plan.digest
+
+
+def test_tours_are_given_up_before_their_next_path(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = state_mission(mrmg.load_scene("scene1"), 0, PARAMS)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
+    request, paths = replace(REQUEST, halt=np.zeros(1, np.bool_)), []
+
+    def tour_path_and_halt(*args: Any) -> Path:
+        request.halt[0] = True
+        paths.append(tour_path(*args))
+        return paths[-1]
+
+    monkeypatch.setattr(following, "tour_path", tour_path_and_halt)
+    assert follow_tours(problem, request, tours).plan is None
+    assert len(paths) == 1 < len(problem.scene.robots)
 
 
 @pytest.mark.parametrize("name", ["quickstart", "hills"])
