@@ -119,9 +119,13 @@ def plan_mission(
 
 
 def _require_known(options: Mapping[str, object]) -> None:
+    allowed = ", ".join([*plan_mission.__kwdefaults__, *Options.__annotations__])
     for name in options:
-        if name not in Options.__optional_keys__:
-            raise TypeError(f"plan() takes no argument {name!r}")
+        if name not in Options.__annotations__:
+            raise TypeError(
+                f"plan() takes no argument {name!r}; allowed: {allowed}; others are "
+                "part of params, as in params=PlannerParams(budget_s=30)"
+            )
 
 
 def _resolved(

@@ -143,3 +143,9 @@ def test_very_short_steps_leave_room_for_long_braking() -> None:
     result = plan_mission(mrmg.load_scene(SCENES / "one_goal.yaml"), params=params)
     assert result.plan is not None
     assert mrmg.verify(mrmg.load_scene(SCENES / "one_goal.yaml"), result.plan).ok
+
+
+def test_an_unknown_argument_is_refused_with_those_there_are() -> None:
+    with pytest.raises(TypeError, match="'budget'; allowed: seed, .*margins") as told:
+        mrmg.plan(edge_scene("one_goal"), budget=3.0)  # type: ignore[call-arg]
+    assert "PlannerParams(budget_s=30)" in str(told.value)
