@@ -14,6 +14,8 @@ seen. The same seed gives the same file.
   0.5 m of a place beside the bay's middle.
 - crowd4, crowd8: first-order unicycles of 0.8 x 0.8 m among ten boxes on 10 x 10 m
   start and end as close to them as 0.03 m.
+- maze4, maze6: first-order unicycles change places in a maze of 5 x 5 cells, 0.6 to
+  1.2 m wide.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import atan2, cos, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,8 @@ import shapely
 import yaml
 from protocol import run, seed_range
 from scipy import ndimage
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import minimum_spanning_tree
 from shapely import affinity
 
 Document = dict[str, Any]
@@ -64,6 +68,10 @@ CROWD = Kind(10, (0.2, 2.2), 0.5, (0.8, 0.8), apart_m=0.03)
 
 APART_M = 0.4
 """Distance of robots from each other where they start and must end."""
+
+MAZE, WALL_M, OPEN_SHARE = 5, 0.1, 0.1
+"""Cells along each side of a maze, width of its walls, and share of those that do not
+have to be open for all cells to be joined, but are."""
 
 CELL_M = 0.1
 """Side of the cells by which that is found."""
@@ -275,6 +283,35 @@ def bay(rng: np.random.Generator) -> Document:
     return {"environment": place, "robots": [car(start, goal)]}
 
 
+def maze(rng: np.random.Generator, robots: int) -> Document:
+    """Return unicycles that change places in a maze, which walls part into cells."""
+    wide, cells = rng.uniform(0.6, 1.2), np.arange(MAZE * MAZE).reshape(MAZE, MAZE)
+    pairs = np.vstack(
+        [
+            np.stack([cells[:, :-1].ravel(), cells[:, 1:].ravel()], axis=1),
+            np.stack([cells[:-1].ravel(), cells[1:].ravel()], axis=1),
+        ]
+    )
+    drawn = csr_array((rng.random(len(pairs)), pairs.T), shape=(cells.size, cells.size))
+    opened = minimum_spanning_tree(drawn).toarray()[*pairs.T] > 0.0
+    opened |= rng.random(len(pairs)) < OPEN_SHARE
+    middle = np.stack(np.divmod(cells.ravel(), MAZE)[::-1], axis=1) * wide + 0.5 * wide
+    apart = np.abs(middle[pairs[:, 1]] - middle[pairs[:, 0]])
+    walls = np.hstack([middle[pairs].mean(axis=1), apart[:, ::-1] + WALL_M])[~opened]
+
+    def pose(cell: int) -> Pose:
+        """Return a pose that faces a cell next to one, without a wall in between."""
+        ends = pairs[opened & (pairs == cell).any(axis=1)]
+        x, y = middle[cell]
+        dx, dy = middle[rng.choice(ends[ends != cell])] - middle[cell]
+        return float(x), float(y), atan2(dy, dx)
+
+    starts, goals = rng.choice(cells.size, (2, robots), replace=False)
+    placed = [unicycle(pose(a), pose(b)) for a, b in zip(starts, goals, strict=True)]
+    place = world(MAZE * wide, MAZE * wide, walls.tolist())
+    return {"environment": place, "robots": placed}
+
+
 CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "yard6": lambda rng: yard(rng, 6),
     "yard7": lambda rng: yard(rng, 7),
@@ -287,6 +324,8 @@ CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "bay": bay,
     "crowd4": lambda rng: crowd(rng, 4),
     "crowd8": lambda rng: crowd(rng, 8),
+    "maze4": lambda rng: maze(rng, 4),
+    "maze6": lambda rng: maze(rng, 6),
 }
 """What makes a file of each class."""
 

@@ -119,7 +119,8 @@ def plan_mission(
 
 
 def _require_known(options: Mapping[str, object]) -> None:
-    allowed = ", ".join([*plan_mission.__kwdefaults__, *Options.__annotations__])
+    own = plan_mission.__kwdefaults__ or {}
+    allowed = ", ".join([*own, *Options.__annotations__])
     for name in options:
         if name not in Options.__annotations__:
             raise TypeError(

@@ -200,7 +200,8 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
     Args:
         own: the robot, shape (1,).
         traffic: the others.
-        inner: radius of the circle around its reference point in its footprint [m].
+        inner: radius of the circle around its reference point in its footprint, with
+            what the size of cells adds [m].
         grid: corner (x, y) of the grid and side of its cells [m].
         layer: steps that a layer lasts.
         soft_s: cost of a layer in conflict with a robot of lower priority.
@@ -215,7 +216,7 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
             continue
         it = traffic.fleet[other]
         outline, placed = it.corner[: it.corners], corner[: it.corners]
-        near = inner + max(own[0].spacing, it.spacing) - 0.5 * cell
+        near = inner + max(own[0].spacing, it.spacing)
         reach = own[0].radius + it.radius
         far = near + it.radius
         t = 0

@@ -14,7 +14,7 @@ BEARINGS = 8
 
 
 class Guide(NamedTuple):
-    """Costs-to-go through all targets of a tour.
+    """Costs-to-go through all targets of a tour, then to where the robot may stay.
 
     Attributes:
         field: from each cell on each leg in each layer of time to the end [s], shape

@@ -209,10 +209,8 @@ def cost_to_go_s(search, place, state):
     legs = len(task.leg)
     on_path = task.home_along if leg == legs else task.along[leg] < np.inf
     x, y = state[0], state[1]
-    time_s = 0.0
     target = task.leg[leg] if leg < legs else task.finish
-    if target >= 0:
-        time_s = guide_at(task.guide, leg, step_number, x, y)
+    time_s = guide_at(task.guide, leg, step_number, x, y)
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
     elif target >= 0:
@@ -221,7 +219,7 @@ def cost_to_go_s(search, place, state):
             time_s += TURNING_SHARE * turning_at(task.guide, leg, state)
         elif posed and own[0].model == CAR:
             posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
-            if leg + 1 < legs or (leg < legs and task.finish >= 0):
+            if leg < legs:
                 center = search.targets.target[target].center
                 posed_s += guide_at(
                     task.guide, leg + 1, step_number, center[0], center[1]

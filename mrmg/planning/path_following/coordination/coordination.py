@@ -175,25 +175,35 @@ class _Planning:
         follows = self._follows[r]
         arrivals, path = self._arrivals(r), self._paths[r]
         task = task_of(self._problem, r, tour, path, arrivals, now, driven=follows)
-        if known and not (follows and len(tour) > 1):
-            return self._search(r, traffic, *self._in_time(r, task, fields, traffic))
-        share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
-        task = task._replace(most=min(share * now.most, LONGEST))
-        return self._search(
-            r, traffic, self._along_path(r, task, now), self._courses[r]
-        )
+
+        def along_path() -> Motion | None:
+            share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
+            longer = task._replace(most=min(share * now.most, LONGEST))
+            longer = self._along_path(r, longer, now)
+            return self._search(r, traffic, longer, self._courses[r])
+
+        if not known:
+            return along_path()
+        for wary in dict.fromkeys((now.wary, False)):
+            timed, way = self._in_time(r, task, fields, traffic, wary)
+            if np.isfinite(guide_at(timed.guide, 0, 0, *self._problem.start[r, :2])):
+                break
+        else:
+            return None  # others stand in its only way
+        found = along_path() if follows and len(tour) > 1 else None
+        return found or self._search(r, traffic, timed, way)
 
     def _in_time(
-        self, r: int, task: Task, fields: Fields, traffic: Traffic
+        self, r: int, task: Task, fields: Fields, traffic: Traffic, wary: bool
     ) -> tuple[Task, Course]:
         """Return a task with costs-to-go that know when the others are where.
 
         It does without the path. Robots that turn on the spot have the way down the
-        costs-to-go instead.
+        costs-to-go instead. Wary ones lead nowhere between robots that stand close.
         """
         problem, tour = self._problem, self._tours[r]
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
-        guide, way = fields.timed(r, tour, task.stay, traffic, costs)
+        guide, way = fields.timed(r, tour, task.stay, traffic, costs, wary)
         turning = fields.turning(r, tour) if self.round.turning else UNKNOWN
         task = task._replace(
             along=np.full(len(task.along), np.inf),

@@ -84,10 +84,14 @@ class Fields:
     def static(self, r: int, targets: Sequence[int]) -> Guide:
         """Return robot r's costs-to-go among obstacles alone."""
         top = float(self._problem.mission.fleet["limit"][r, 1])
-        legs = [self._way(r, tuple(targets[i:])) / top for i in range(len(targets))]
-        if not legs:
-            return NO_GUIDE
-        return Guide(np.stack(legs)[:, None], UNKNOWN, *self._grid, 1 << 30)
+        field = np.zeros((self._legs(r, targets), 1, *self._shape))
+        for i in range(len(targets)):
+            field[i, 0] = self._way(r, tuple(targets[i:])) / top
+        return Guide(field, UNKNOWN, *self._grid, 1 << 30)
+
+    def _legs(self, r: int, targets: Sequence[int]) -> int:
+        """Return the legs of a tour: without a finish, one more to where r stays."""
+        return len(targets) + int(self._problem.mission.targets.finish[r] < 0)
 
     def _layers(self, r: int, traffic: Traffic) -> tuple[int, int]:
         """Return how many steps a layer of time lasts for robot r, and the layers."""
@@ -100,7 +104,7 @@ class Fields:
         return 0 < self._timed_cells(r, targets, traffic) <= MOST_TIMED_CELLS
 
     def _timed_cells(self, r: int, targets: Sequence[int], traffic: Traffic) -> int:
-        layers = len(targets) * self._layers(r, traffic)[1]
+        layers = self._legs(r, targets) * self._layers(r, traffic)[1]
         return int(layers * self._shape[0] * self._shape[1])
 
     def timed(
@@ -110,6 +114,7 @@ class Fields:
         stay: np.ndarray,
         traffic: Traffic,
         costs: tuple[float, float],
+        wary: bool,
     ) -> tuple[Guide, np.ndarray]:
         """Return robot r's costs-to-go among the others, and the way down them.
 
@@ -123,6 +128,8 @@ class Fields:
             traffic: how the others move.
             costs: of a second of holding, and of a second in conflict with a robot of
                 lower priority.
+            wary: whether it keeps half a cell more away from the others than it must,
+                or less, so that it is led to wherever it may get through.
         """
         mission, dt_s, cell_m = self._problem.mission, self._problem.dt_s, self._cell_m
         own = mission.fleet[r : r + 1]
@@ -132,22 +139,22 @@ class Fields:
         hold_share, soft_share = costs
         penalty, layer_s = np.zeros((layers, *price.shape)), layer * dt_s
         inner_m = self._problem.scene.robots[r].model.inscribed_radius_m
+        inner_m += 0.5 * cell_m if wary else -0.5 * cell_m
         _field_kernels.add_others(
             own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
         )
-        standing, stood = hold_share * layer_s, np.full(len(targets), -1)
+        regions = self._regions(r, targets)
+        standing, stood = hold_share * layer_s, np.full(len(regions), -1)
         stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
-        field = np.empty((len(targets), *penalty.shape))
-        for i in range(len(targets) - 1, -1, -1):
-            region = self._region(targets[i : i + 1])
+        field = np.empty((len(regions), *penalty.shape))
+        for i, region in reversed([*enumerate(regions)]):
             hold = np.full(price.shape, standing)
             field[i] = np.inf
             last = np.where(region, 0.0, np.inf)
             if stood[i] >= 0:
                 ahead = np.minimum(np.arange(layers) + stood[i], layers - 1)
-                through = i + 1 == len(targets)
-                field[i][:, region] = 0.0 if through else field[i + 1, ahead][:, region]
+                field[i][:, region] = field[i + 1, ahead][:, region]
                 last = field[i, -1]
             else:
                 hold[region] = 0.0
@@ -156,13 +163,13 @@ class Fields:
             _field_kernels.timed_cost_to_go(price, penalty, hold, field[i])
         way = self._problem.start[r : r + 1, :2]
         if own[0]["model"] != CAR:
-            way = self._way_down(r, targets, stood, (price, standing, field))
+            way = self._way_down(r, regions, stood, (price, standing, field))
         return Guide(field, UNKNOWN, *self._grid, layer), way
 
     def _way_down(
         self,
         r: int,
-        targets: Sequence[int],
+        regions: np.ndarray,
         stood: np.ndarray,
         costs: tuple[np.ndarray, float, np.ndarray],
     ) -> np.ndarray:
@@ -170,16 +177,15 @@ class Fields:
 
         Args:
             r: robot.
-            targets: of its tour.
+            regions: that its legs lead to.
             stood: layers to stand in each of them, -1 for good.
             costs: of a cell's side, of holding for a layer, and to go.
         """
         corner, here = np.array(self._grid[:2]), self._problem.start[r, :2]
         rows, columns = self._shape
-        way = np.zeros((len(costs[2][0]) + 2 * len(targets) * (rows + columns), 2), int)
+        way = np.zeros((len(costs[2][0]) + 2 * len(regions) * (rows + columns), 2), int)
         cell = ((here - corner) // self._cell_m).astype(int)
         way[0] = np.clip(cell[::-1], 0, (rows - 1, columns - 1))
-        regions = np.stack([self._region([target]) for target in targets])
         size = _field_kernels.descend(costs[0], regions, stood, *costs[1:], way)
         points = corner + (way[:size, ::-1] + 0.5) * self._cell_m
         points[0] = here
@@ -303,6 +309,13 @@ class Fields:
             most_m = away_m.reshape(rows, parts, columns, parts).max(axis=(1, 3))
             self._room[space, needed_m] = most_m > needed_m - 0.5 * fine_m
         return self._room[space, needed_m]
+
+    def _regions(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        """Return which cells each leg of robot r's tour ends in, shape (L, ny, nx)."""
+        regions = np.ones((self._legs(r, targets), *self._shape), bool)
+        for region, target in zip(regions, targets, strict=False):
+            region[:] = self._region([target])
+        return regions
 
     def _region(self, targets: Sequence[int]) -> np.ndarray:
         """Return which cells lie in one of some targets, shape (ny, nx)."""

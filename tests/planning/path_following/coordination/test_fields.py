@@ -151,8 +151,9 @@ def test_joined_cells_lead_through_an_opening(yard: Callable[..., Scene]) -> Non
     assert joined_s == pytest.approx(fine_s, rel=0.1)
 
 
+@pytest.mark.parametrize("wary", [True, False])
 def test_costs_to_go_in_time_keep_out_of_where_others_are(
-    yard: Callable[..., Scene], state: Callable[..., Problem]
+    wary: bool, yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
     """Against shapely: of a hauler that turns and then stands for good."""
     fleet = {"r1": ("car", [4, 16, 0]), "r2": ("hauler", [10, 9, 0.3])}
@@ -170,11 +171,11 @@ def test_costs_to_go_in_time_keep_out_of_where_others_are(
     traffic = traffic._replace(end=200)
     fields = Fields(problem)
     free = np.isfinite(fields.static(0, [0]).field[0, 0])
-    guide, _ = fields.timed(0, [0], np.zeros(1, int), traffic, (0.3, 1.0))
+    guide, _ = fields.timed(0, [0], np.zeros(1, int), traffic, (0.3, 1.0), wary)
     own, other = problem.mission.fleet
     model = scene.robots[0].model
     near_m = model.inscribed_radius_m + max(own["spacing"], other["spacing"])
-    near_m -= 0.5 * guide.cell
+    near_m += 0.5 * guide.cell if wary else -0.5 * guide.cell
     _, layers, rows, columns = guide.field.shape
     y, x = (guide.cell * (np.mgrid[:rows, :columns] + 0.5)) + [
         [[guide.y_min]],
@@ -191,6 +192,43 @@ def test_costs_to_go_in_time_keep_out_of_where_others_are(
             beside = free & (apart_m > near_m + 1e-6)
             assert np.isfinite(guide.field[0, t][beside]).all()
     assert layers * guide.layer > 2 * len(drive)
+
+
+@pytest.mark.parametrize("tour", [[], [0]])
+def test_costs_to_go_lead_out_of_the_way_of_others_after_the_last_target(
+    tour: list[int], yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Of a robot in a dead end, to which another one drives to stay."""
+    scene = yard(
+        bounds=[0, 0, 21, 10],
+        obstacles=[
+            {"polygon": [[8, 0], [21, 0], [21, 4.2], [8, 4.2]]},
+            {"polygon": [[8, 5.8], [21, 5.8], [21, 10], [8, 10]]},
+        ],
+        goals=[{"id": "g", "circle": {"center": [20, 5], "radius": 0.4}}],
+        robots=[
+            {"id": "r1", "model": "diffdrive", "pose": [20, 5, 0]},
+            {"id": "r2", "model": "diffdrive", "pose": [2, 5, 0]},
+        ],
+    )
+    problem = state(scene, samples=50)
+    drive = np.linspace(2.0, 20.0, 400)[:, None] * [1.0, 0, 0, 0, 0] + [0, 5, 0, 0, 0]
+    motions = [None, Motion(drive, np.zeros((len(drive) - 1, 2)))]
+    traffic = FleetTraffic(problem, 500).around(0, motions, np.array([False, True]))
+    guide, way = Fields(problem).timed(
+        0, tour, np.zeros(len(tour), int), traffic, (0.3, 1.0), False
+    )
+
+    def rest_s(step: int, x: float, y: float) -> float:
+        return float(_guide_kernels.guide_at(guide, len(tour), step, x, y))
+
+    top = float(problem.mission.fleet["limit"][0, 1])
+    assert rest_s(0, 4.0, 8.0) == 0.0
+    assert (20.0 - 8.0) / top < rest_s(0, 20.0, 5.0) < 3.0 * (20.0 - 8.0) / top
+    assert rest_s(400, 20.0, 5.0) == inf
+    assert rest_s(400, 4.0, 5.0) == 0.0
+    assert way[-1, 0] < 8.0
+    assert guide.field.shape[0] == len(tour) + 1
 
 
 @pytest.mark.parametrize("leg", [0, 1, 7])
