@@ -5,8 +5,10 @@ outline, speeds and limits; then a map in proportion to the larger kind, 1 to 5 
 2 to 11 goals, and by turns finishes, headings, stays, stations, terrain, scarce
 batteries and the makespan as objective. All places lie in one part of the free space,
 but nothing makes sure that there is a plan: rows without one count as failed. Robots
-that are drawn have no MJCF, so that plans are verified but not driven. Protocol: that
-of `tools/bench`, one row a mission; the same number gives the same mission.
+that are drawn have no MJCF, so that plans are verified but not driven. With `--mazes`
+the walls of a maze take the place of polygons, so that robots, with goals or without,
+can hardly pass each other. Protocol: that of `tools/bench`, one row a mission; the same
+number gives the same mission.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json are those of `tools/bench`.
@@ -24,6 +26,7 @@ import bench
 import numpy as np
 import shapely
 import yaml
+from maze import drawn_maze
 from protocol import run, seed_range
 
 from mrmg.scene.loading import scene_from_document
@@ -45,6 +48,9 @@ SIDE = 10.0, 25.0
 OBSTACLE = 0.4, 3.0
 """Radius of obstacles, likewise."""
 
+CORRIDOR = 2.2, 3.2
+"""Side of a maze's cells, likewise."""
+
 ROOM, GOAL_ROOM = 1.0, 0.6
 """Distance of robots and of goals from obstacles, likewise."""
 
@@ -57,7 +63,10 @@ def main() -> int:
     options = parse_options()
     print(f"{__doc__}\n{bench.protocol(options)}")
     with tempfile.TemporaryDirectory() as folder:
-        drawn = (mission(number, Path(folder)) for number in options.missions)
+        drawn = (
+            mission(number, Path(folder), maze=options.mazes)
+            for number in options.missions
+        )
         scenes = ((scene.name, scene) for scene in drawn)
         return bench.plan_each(scenes, options, "bench_random")
 
@@ -68,11 +77,12 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--missions", type=seed_range, default="0-99", help="first-last, default 0-99"
     )
+    parser.add_argument("--mazes", action="store_true", help="mazes, not polygons")
     bench.add_mission_options(parser, seeds="0-0")
     return parser.parse_args()
 
 
-def mission(number: int, folder: Path) -> Scene:
+def mission(number: int, folder: Path, *, maze: bool = False) -> Scene:
     """Return a drawn mission; models of its robots are written to a folder."""
     rng = np.random.default_rng(number)
     kinds = [robot_model(rng) for _ in range(rng.integers(1, 3))]
@@ -81,7 +91,7 @@ def mission(number: int, folder: Path) -> Scene:
         base.mkdir(parents=True, exist_ok=True)
         (base / "robot.yaml").write_text(yaml.safe_dump(kind))
     longest_m = max(float(np.ptp(kind["footprint"], axis=0)[0]) for kind in kinds)
-    places = _Places(rng, longest_m)
+    places = _Places(rng, longest_m, maze)
     terrain, document = [], places.document
     robots = [
         {"id": f"r{i}", "model": str(folder / f"{number}_{rng.integers(len(kinds))}")}
@@ -160,18 +170,11 @@ class _Places:
         sides_m: of the map.
     """
 
-    def __init__(self, rng: np.random.Generator, longest_m: float) -> None:
+    def __init__(self, rng: np.random.Generator, longest_m: float, maze: bool) -> None:
         self._rng, self._longest_m = rng, longest_m
         self._taken = shapely.MultiPoint()
-        wide_m = longest_m * rng.uniform(*SIDE)
-        self.sides_m = np.array([wide_m, wide_m * rng.uniform(0.5, 1.0)])
+        obstacles = self._walls() if maze else self._polygons()
         bounds = shapely.box(0.0, 0.0, *self.sides_m)
-        obstacles = [
-            part
-            for _ in range(rng.integers(2, 14))
-            for part in shapely.get_parts(self._obstacle() & bounds)
-            if part.area > 0.01
-        ]
         land = bounds.buffer(-GOAL_ROOM * longest_m) - shapely.union_all(
             obstacles
         ).buffer(GOAL_ROOM * longest_m)
@@ -203,6 +206,26 @@ class _Places:
         """Return the region of a goal, a station or a finish."""
         radius_m = self._longest_m * self._rng.uniform(0.1, 0.4)
         return {"circle": {"center": at, "radius": round(float(radius_m), 3)}}
+
+    def _walls(self) -> list[shapely.Polygon]:
+        """Draw a maze."""
+        drawn = drawn_maze(self._rng, self._longest_m * self._rng.uniform(*CORRIDOR))
+        self.sides_m = np.full(2, drawn.side_m)
+        at, half = drawn.wall[:, :2], 0.5 * drawn.wall[:, 2:]
+        corners = np.hstack([at - half, at + half])
+        return [shapely.box(*corner) for corner in corners.clip(0.0, drawn.side_m)]
+
+    def _polygons(self) -> list[shapely.Polygon]:
+        """Draw a map with polygons."""
+        wide_m = self._longest_m * self._rng.uniform(*SIDE)
+        self.sides_m = np.array([wide_m, wide_m * self._rng.uniform(0.5, 1.0)])
+        bounds = shapely.box(0.0, 0.0, *self.sides_m)
+        return [
+            part
+            for _ in range(self._rng.integers(2, 14))
+            for part in shapely.get_parts(self._obstacle() & bounds)
+            if part.area > 0.01
+        ]
 
     def _obstacle(self) -> shapely.Polygon:
         rng, corners = self._rng, int(self._rng.integers(3, 9))

@@ -31,10 +31,9 @@ from typing import Any
 import numpy as np
 import shapely
 import yaml
+from maze import drawn_maze
 from protocol import run, seed_range
 from scipy import ndimage
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import minimum_spanning_tree
 from shapely import affinity
 
 Document = dict[str, Any]
@@ -69,9 +68,8 @@ CROWD = Kind(10, (0.2, 2.2), 0.5, (0.8, 0.8), apart_m=0.03)
 APART_M = 0.4
 """Distance of robots from each other where they start and must end."""
 
-MAZE, WALL_M, OPEN_SHARE = 5, 0.1, 0.1
-"""Cells along each side of a maze, width of its walls, and share of those that do not
-have to be open for all cells to be joined, but are."""
+MAZE_CELL_M = 0.6, 1.2
+"""Sides of a maze's cells, least and most."""
 
 CELL_M = 0.1
 """Side of the cells by which that is found."""
@@ -284,31 +282,19 @@ def bay(rng: np.random.Generator) -> Document:
 
 
 def maze(rng: np.random.Generator, robots: int) -> Document:
-    """Return unicycles that change places in a maze, which walls part into cells."""
-    wide, cells = rng.uniform(0.6, 1.2), np.arange(MAZE * MAZE).reshape(MAZE, MAZE)
-    pairs = np.vstack(
-        [
-            np.stack([cells[:, :-1].ravel(), cells[:, 1:].ravel()], axis=1),
-            np.stack([cells[:-1].ravel(), cells[1:].ravel()], axis=1),
-        ]
-    )
-    drawn = csr_array((rng.random(len(pairs)), pairs.T), shape=(cells.size, cells.size))
-    opened = minimum_spanning_tree(drawn).toarray()[*pairs.T] > 0.0
-    opened |= rng.random(len(pairs)) < OPEN_SHARE
-    middle = np.stack(np.divmod(cells.ravel(), MAZE)[::-1], axis=1) * wide + 0.5 * wide
-    apart = np.abs(middle[pairs[:, 1]] - middle[pairs[:, 0]])
-    walls = np.hstack([middle[pairs].mean(axis=1), apart[:, ::-1] + WALL_M])[~opened]
+    """Return unicycles that change places in a maze."""
+    drawn = drawn_maze(rng, rng.uniform(*MAZE_CELL_M))
 
     def pose(cell: int) -> Pose:
-        """Return a pose that faces a cell next to one, without a wall in between."""
-        ends = pairs[opened & (pairs == cell).any(axis=1)]
-        x, y = middle[cell]
-        dx, dy = middle[rng.choice(ends[ends != cell])] - middle[cell]
+        """Return a pose in a cell, which faces one that no wall parts from it."""
+        pairs = drawn.joined[(drawn.joined == cell).any(axis=1)]
+        x, y = drawn.middle[cell]
+        dx, dy = drawn.middle[rng.choice(pairs[pairs != cell])] - drawn.middle[cell]
         return float(x), float(y), atan2(dy, dx)
 
-    starts, goals = rng.choice(cells.size, (2, robots), replace=False)
+    starts, goals = rng.choice(len(drawn.middle), (2, robots), replace=False)
     placed = [unicycle(pose(a), pose(b)) for a, b in zip(starts, goals, strict=True)]
-    place = world(MAZE * wide, MAZE * wide, walls.tolist())
+    place = world(drawn.side_m, drawn.side_m, drawn.wall.tolist())
     return {"environment": place, "robots": placed}
 
 
