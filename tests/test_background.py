@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -99,7 +98,7 @@ def test_a_roadmap_that_takes_too_long_is_no_plan_and_is_given_up(
 
     def endless(*args: np.ndarray) -> None:
         while not args[-1][0]:
-            time.sleep(0.01)
+            given_up.wait(0.01)
         given_up.set()
 
     monkeypatch.setattr(planner, "state_mission", endless)

@@ -33,6 +33,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 )
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.rounds import (
+    LEAST_INFLATION,
     LONGEST,
     ROUNDS,
     ROUNDS_ALONE,
@@ -184,8 +185,8 @@ class _Planning:
 
         if not known:
             return along_path()
-        for wary in dict.fromkeys((now.wary, False)):
-            timed, way = self._in_time(r, task, fields, traffic, wary)
+        for inflation in dict.fromkeys((now.inflation, LEAST_INFLATION)):
+            timed, way = self._in_time(r, task, fields, traffic, inflation)
             if np.isfinite(guide_at(timed.guide, 0, 0, *self._problem.start[r, :2])):
                 break
         else:
@@ -194,16 +195,17 @@ class _Planning:
         return found or self._search(r, traffic, timed, way)
 
     def _in_time(
-        self, r: int, task: Task, fields: Fields, traffic: Traffic, wary: bool
+        self, r: int, task: Task, fields: Fields, traffic: Traffic, inflation: float
     ) -> tuple[Task, Course]:
         """Return a task with costs-to-go that know when the others are where.
 
         It does without the path. Robots that turn on the spot have the way down the
-        costs-to-go instead. Wary ones lead nowhere between robots that stand close.
+        costs-to-go instead. Where others stand close together, inflated ones leave no
+        way between them.
         """
         problem, tour = self._problem, self._tours[r]
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
-        guide, way = fields.timed(r, tour, task.stay, traffic, costs, wary)
+        guide, way = fields.timed(r, tour, task.stay, traffic, costs, inflation)
         turning = fields.turning(r, tour) if self.round.turning else UNKNOWN
         task = task._replace(
             along=np.full(len(task.along), np.inf),

@@ -114,7 +114,7 @@ class Fields:
         stay: np.ndarray,
         traffic: Traffic,
         costs: tuple[float, float],
-        wary: bool,
+        inflation: float,
     ) -> tuple[Guide, np.ndarray]:
         """Return robot r's costs-to-go among the others, and the way down them.
 
@@ -128,8 +128,8 @@ class Fields:
             traffic: how the others move.
             costs: of a second of holding, and of a second in conflict with a robot of
                 lower priority.
-            wary: whether it keeps half a cell more away from the others than it must,
-                or less, so that it is led to wherever it may get through.
+            inflation: of the others, beyond the distance to be kept from them, in
+                sides of cells; below 0 it is led to wherever it may get through.
         """
         mission, dt_s, cell_m = self._problem.mission, self._problem.dt_s, self._cell_m
         own = mission.fleet[r : r + 1]
@@ -139,7 +139,7 @@ class Fields:
         hold_share, soft_share = costs
         penalty, layer_s = np.zeros((layers, *price.shape)), layer * dt_s
         inner_m = self._problem.scene.robots[r].model.inscribed_radius_m
-        inner_m += 0.5 * cell_m if wary else -0.5 * cell_m
+        inner_m += inflation * cell_m
         _field_kernels.add_others(
             own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
         )

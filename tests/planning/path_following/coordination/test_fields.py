@@ -151,9 +151,9 @@ def test_joined_cells_lead_through_an_opening(yard: Callable[..., Scene]) -> Non
     assert joined_s == pytest.approx(fine_s, rel=0.1)
 
 
-@pytest.mark.parametrize("wary", [True, False])
+@pytest.mark.parametrize("inflation", [0.5, -0.5])
 def test_costs_to_go_in_time_keep_out_of_where_others_are(
-    wary: bool, yard: Callable[..., Scene], state: Callable[..., Problem]
+    inflation: float, yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
     """Against shapely: of a hauler that turns and then stands for good."""
     fleet = {"r1": ("car", [4, 16, 0]), "r2": ("hauler", [10, 9, 0.3])}
@@ -171,11 +171,11 @@ def test_costs_to_go_in_time_keep_out_of_where_others_are(
     traffic = traffic._replace(end=200)
     fields = Fields(problem)
     free = np.isfinite(fields.static(0, [0]).field[0, 0])
-    guide, _ = fields.timed(0, [0], np.zeros(1, int), traffic, (0.3, 1.0), wary)
+    guide, _ = fields.timed(0, [0], np.zeros(1, int), traffic, (0.3, 1.0), inflation)
     own, other = problem.mission.fleet
     model = scene.robots[0].model
     near_m = model.inscribed_radius_m + max(own["spacing"], other["spacing"])
-    near_m += 0.5 * guide.cell if wary else -0.5 * guide.cell
+    near_m += inflation * guide.cell
     _, layers, rows, columns = guide.field.shape
     y, x = (guide.cell * (np.mgrid[:rows, :columns] + 0.5)) + [
         [[guide.y_min]],
@@ -216,7 +216,7 @@ def test_costs_to_go_lead_out_of_the_way_of_others_after_the_last_target(
     motions = [None, Motion(drive, np.zeros((len(drive) - 1, 2)))]
     traffic = FleetTraffic(problem, 500).around(0, motions, np.array([False, True]))
     guide, way = Fields(problem).timed(
-        0, tour, np.zeros(len(tour), int), traffic, (0.3, 1.0), False
+        0, tour, np.zeros(len(tour), int), traffic, (0.3, 1.0), -0.5
     )
 
     def rest_s(step: int, x: float, y: float) -> float:
