@@ -9,6 +9,7 @@ import pytest
 
 import mrmg
 from mrmg.planning import PlannerParams
+from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import coordination
 from mrmg.planning.path_following.coordination.coordination import (
     coordinated,
@@ -16,7 +17,7 @@ from mrmg.planning.path_following.coordination.coordination import (
 )
 from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import no_path, task_of
-from mrmg.planning.path_following.tracking import Motion
+from mrmg.planning.path_following.tracking import Motion, drive_alone
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.scene.types import Scene
@@ -112,6 +113,40 @@ def test_a_motion_that_begins_anew_is_the_old_one_until_then(
     assert found is not None
     assert np.array_equal(found.state[:16], away.state[:16])
     assert np.hypot(*(found.state[:, :2] - (12.0, 5.0)).T).min() < 1.0
+
+
+def test_no_node_is_looked_at_where_another_robot_fills_the_only_way(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """A search along the path, in vain, would take five times a round's nodes."""
+    poses = {"own": [4, 10, 0], "other": [15, 10, 0]}
+    goals = {"first": [20, 10], "second": [26, 10]}
+    scene = yard(
+        goals=[
+            {"id": name, "circle": {"center": at, "radius": 0.5}}
+            for name, at in goals.items()
+        ],
+        obstacles=[
+            {"polygon": [[0, y], [30, y], [30, y + 9.2], [0, y + 9.2]]}
+            for y in (0, 10.8)
+        ],
+        robots=[
+            {"id": name, "model": "diffdrive", "pose": pose}
+            for name, pose in poses.items()
+        ],
+    )
+    problem = state(scene, samples=50)
+    node = np.stack([np.linspace(4.0, 26.0, 23), np.full(23, 10.0)], axis=1)
+    stops = {"stop": np.array([16, 22]), "target": np.array([0, 1])}
+    none = {"deeper": np.zeros(2), "pause_s": np.zeros(2), "aim": np.full(2, np.nan)}
+    path = Path(node, np.ones(22, np.int64), 0.0, **stops, **none)
+    drives = [drive_alone(problem, 0, path), None]
+    paths = [path, no_path(problem, 1)]
+    planning = coordination._Planning(problem, [[0, 1], []], paths, drives, 2000)
+    stands = [None, Motion(problem.start[1:2], np.zeros((0, 2)))]
+    assert planning.find(0, stands, np.array([False, True])) is None
+    assert planning.nodes == 1
+    assert planning.find(0, stands, np.zeros(2, bool)) is not None
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive", "husky"])
