@@ -71,12 +71,9 @@ radius: driving is a little off them."""
 TIGHT_SHARE = 8.0
 """What an arc without that room costs more, as a share of its length."""
 
-MOST_POSES = 200_000
-"""Poses of a search at most: half a second, or a second with gates, and 25 MB."""
-
-SOON_POSES = 70_000
-"""The same where ways are wanted soon. Of 211 searches that found one, none looked at
-more than 49,000: more are better spent on other margins and tours first."""
+MOST_POSES = 70_000
+"""Poses of a search at most: a third of a second. Of 330 searches that found a way, one
+looked at more; those that find none are better spent on other margins and tours."""
 
 
 def posed(
@@ -126,7 +123,7 @@ def posed(
         weight=SOON_WEIGHT if soon else 1.0,
         halt=halt,
     )
-    ways = _ways_of(search, SOON_POSES if soon else MOST_POSES)
+    ways = _ways_of(search)
     for way in ways:
         drive = drive_alone(problem, r, with_pauses(problem, r, way))
         visits = visit_steps(targets, tour, drive.motion.state)
@@ -191,14 +188,14 @@ def _gates_before(
         run_up = roomy
 
 
-def _ways_of(search: PoseSearch, most: int) -> tuple[Path, ...]:
+def _ways_of(search: PoseSearch) -> tuple[Path, ...]:
     """Return the way over poses that a search finds, as it is and to stop and steer.
 
-    Nothing if it finds none among so many poses. Cars stop where the way's curvature
+    Nothing if it finds none among MOST_POSES. Cars stop where the way's curvature
     jumps.
     """
-    stops, poses = search.stops, np.empty(most, POSE)
-    table = np.full(1 << (2 * most).bit_length(), -1, np.int64)
+    stops, poses = search.stops, np.empty(MOST_POSES, POSE)
+    table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
     last = _pose_kernels.find_poses(search, poses, table)
     if last < 1:
         return ()

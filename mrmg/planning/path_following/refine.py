@@ -12,19 +12,21 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from math import remainder, tau
 
 import numpy as np
 
-from mrmg.motion._kernels import USER
+from mrmg.motion._kernels import CAR, USER
 from mrmg.planning.attempt import Request
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_maps_of, inflated
+from mrmg.planning.path_following.gears import smoothed_cost_m
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.robot_task import RobotTask
@@ -120,30 +122,31 @@ def drive_paths(
         problem: the mission.
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
-        soon: whether a way over poses that a robot drives where it does not get
-            through is wanted soon rather than cheap; None if it does without.
+        soon: whether ways over poses are wanted soon rather than cheap; None to do
+            without.
         rounds: of the search for motions.
 
     Returns:
         Trajectories of all robots, none if it failed; and why it did, in words.
     """
-    tasks, drives = list(tasks), []
+    driven, drives = list[RobotTask](), list[Drive | None]()
     for r, task in enumerate(tasks):
         if halt[0]:
             return (), ""
-        drive, failure = _driven(problem, r, task)
-        if drive is None and failure and soon is not None:
-            other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
-            if other is not None:
-                tasks[r] = other
-                drive, _ = _driven(problem, r, other)
-        if drive is None and failure:
-            return (), failure
+        failures = []
+        for way in _ways(problem, r, task, halt, soon):
+            drive, failure = _driven(problem, r, way)
+            failures.append(failure)
+            if drive is not None or not failure:
+                break
+        else:
+            return (), failures[0]
+        driven.append(way)
         drives.append(drive)
     trajectories = coordinated(
         problem,
-        [task.tour for task in tasks],
-        [with_pauses(problem, r, task.path) for r, task in enumerate(tasks)],
+        [way.tour for way in driven],
+        [with_pauses(problem, r, way.path) for r, way in enumerate(driven)],
         halt,
         rounds=rounds,
         drives=drives,
@@ -151,6 +154,28 @@ def drive_paths(
     if trajectories:
         return trajectories, ""
     return (), ROBOTS_MEET
+
+
+def _ways(
+    problem: Problem, r: int, task: RobotTask, halt: np.ndarray, soon: bool | None
+) -> Iterator[RobotTask]:
+    """Yield what robot r drives, one after another until it gets through.
+
+    That is its path, then a way over poses. Where there is time, a car with headings to
+    arrive in begins with the cheaper one: a path has few ways to turn round.
+    """
+    if soon is None:
+        yield task
+        return
+    over_poses = partial(posed, problem, r, task.cost_map, task.tour, halt, soon=soon)
+    car = problem.mission.fleet[r]["model"] == CAR
+    if soon or not car or not np.isfinite(task.path.aim).any():
+        yield task
+        yield from filter(None, [over_poses()])
+        return
+    ways = filter(None, [task, over_poses()])
+    cost_m = partial(smoothed_cost_m, problem, r, task.cost_map)
+    yield from sorted(ways, key=lambda one: cost_m(one.path))
 
 
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
