@@ -35,8 +35,8 @@ TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
 """Shares of the time limit that the tours of successive attempts may take: driving
 takes longer than by the roadmap where robots turn much or get in each other's way."""
 
-DRAWS_PER_ATTEMPT = 6
-"""Tours drawn by each attempt after the first one, of which the best are followed."""
+DRAWS_PER_ATTEMPT = 8
+"""Tours drawn by each attempt after the first one at most; the best are followed."""
 
 FURTHER_DRAWS = (1, 3)
 """Draws that the first attempt goes on with where its first one fails: the next is of
@@ -219,7 +219,7 @@ def follow_paths(
         learnt: by following tours before; receives what is learnt by these.
     """
     began = time.perf_counter()
-    choice = drawn_tours(problem, request, draws)
+    choice, calls = drawn_tours(problem, request, draws)
     routing_s = time.perf_counter() - began
     problem = problem.with_margin(0.0)
     preference = problem.preference
@@ -250,5 +250,5 @@ def follow_paths(
         ):
             plans.append(plan)
             found_at.append(time.perf_counter())
-    counts = {"path_following_plans": driven, "router_calls": len(draws)}
+    counts = {"path_following_plans": driven, "router_calls": calls}
     return Attempt(plans, found_at, routing_s, counts, bool(choice), blocked, refused)

@@ -17,7 +17,7 @@ from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import Routing
 
 PARAMS = PlannerParams(samples=600)
-PLAIN = [Draw(number, 0.0, 0.0) for number in range(4)]
+PLAIN = [Draw(number, 0.0, 0.0) for number in range(6)]
 
 
 def request() -> Request:
@@ -37,8 +37,8 @@ def test_tours_that_recharge_are_drawn_for_what_smoothed_paths_take(
         return tours
 
     monkeypatch.setattr(draws, "_drawn", spy)
-    found = drawn_tours(problem, request(), PLAIN)
-    assert len(seen) == len(PLAIN)
+    found, calls = drawn_tours(problem, request(), PLAIN)
+    assert calls == len(seen) == len(PLAIN)
     assert {tours.tours for tours in found} == {tours.tours for _, tours in seen}
     assert seen[0][0] == 0.0
     surcharges = {surcharge for surcharge, _ in seen[1:]}
@@ -49,14 +49,15 @@ def test_tours_that_recharge_are_drawn_for_what_smoothed_paths_take(
         assert tours.cost_J == pytest.approx(smooth_J, rel=0.04)
 
 
-def test_where_nobody_recharges_nothing_is_measured() -> None:
+def test_where_nobody_recharges_few_draws_are_enough() -> None:
     scene = mrmg.load_scene("scene1")
     ample = [
         replace(r, battery=replace(r.battery, capacity_J=1e9, start_J=1e9))
         for r in scene.robots
     ]
     problem = state_mission(replace(scene, robots=tuple(ample)), 0, PARAMS)
-    found = drawn_tours(problem, request(), PLAIN)
+    found, calls = drawn_tours(problem, request(), PLAIN)
+    assert calls == draws.FEW_DRAWS < len(PLAIN)
     assert len({tours.tours for tours in found}) == len(found)
     costs_J = [draws.path_cost_J(problem, tours) for tours in found]
     assert costs_J == sorted(costs_J)
@@ -64,5 +65,6 @@ def test_where_nobody_recharges_nothing_is_measured() -> None:
 
 def test_one_draw_is_followed_as_it_is() -> None:
     problem = state_mission(mrmg.load_scene("scene1"), 0, PARAMS)
-    (only,) = drawn_tours(problem, request(), PLAIN[:1])
-    assert np.isfinite(only.cost_J)
+    found, calls = drawn_tours(problem, request(), PLAIN[:1])
+    assert calls == len(found) == 1
+    assert np.isfinite(found[0].cost_J)
