@@ -60,8 +60,8 @@ class Room(NamedTuple):
 
     Attributes:
         pose: the best one known: (x [m], y [m], yaw [rad]), shape (3,).
-        room_m: how far the body is from obstacles there, or the room to the region's
-            edge where that is less; -inf if no pose is known that meets no obstacle.
+        room_m: how far the body is from obstacles there; -inf if no pose is known that
+            meets no obstacle.
         most_m: no pose has more.
     """
 
@@ -76,7 +76,6 @@ def roomiest_pose(
     poses: Poses,
     enough_m: float = 0.0,
     accuracy_m: float = ACCURACY_M,
-    edge_m: float = inf,
 ) -> Room | None:
     """Return the pose in which a body has most room, or enough of it.
 
@@ -88,7 +87,6 @@ def roomiest_pose(
         poses: from which one is chosen.
         enough_m: room that is enough.
         accuracy_m: by which it may be less than the most.
-        edge_m: room at the region's edge, to which the depth inside is added.
     """
     outline, reach_m = robot.model.footprint_m, robot.model.circumscribed_radius_m
     low_m, high_m = np.reshape(shapely.bounds(poses.region.shape), (2, 2))
@@ -112,13 +110,12 @@ def roomiest_pose(
         stray_m = off_m + moved_m[2]
         bodies = shapely.polygons(placed(outline, boxes))
         room_m = np.where(meets(bodies), -inf, shapely.distance(edges, bodies))
-        within_m = np.minimum(room_m, depth_m + edge_m)
-        inside_m = np.where(depth_m >= 0.0, within_m, -inf)
+        inside_m = np.where(depth_m >= 0.0, room_m, -inf)
         if inside_m.max() > best_m:
             best, best_m = boxes[inside_m.argmax()], float(inside_m.max())
         if best_m >= enough_m:
             return Room(best, best_m, inf)
-        bound_m = np.minimum(room_m.clip(0.0) + stray_m, depth_m + off_m + edge_m)
+        bound_m = room_m.clip(0.0) + stray_m
         left = (depth_m >= -off_m) & (bound_m > best_m + accuracy_m)
         core = _shrunk(outline, stray_m)
         if len(core):

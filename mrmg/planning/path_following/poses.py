@@ -170,22 +170,17 @@ def _gates_before(
 ) -> Iterator[tuple[float, ...]]:
     """Yield the gates from which robot r drives to a pose straight in some gear.
 
-    They leave room beyond the margin, and so does the way on from them for a while:
-    driving comes off a turn a little askew. The pose itself is one in any case.
+    There is room for the robot in all of them, and on the way on from them.
     """
     own, spaces = problem.mission.fleet[r : r + 1], problem.mission.spaces
     margin_m, radius_m = float(own[0]["margin"]), float(own[0]["radius"])
-    corner, run_up = np.empty((MOST_CORNERS, 2)), True
+    corner = np.empty((MOST_CORNERS, 2))
     for i in range(GATES):
         way_m = gear * i * radius_m
         gate = end - way_m * np.array([cos(end[2]), sin(end[2]), 0.0])
         if not keeps_clear(own, spaces, gate, margin_m, corner):
             return
-        room_m = margin_m + ROOM_SHARE * radius_m
-        roomy = keeps_clear(own, spaces, gate, room_m, corner)
-        if (roomy and run_up) or i == 0:
-            yield (*gate, way_m)
-        run_up = roomy
+        yield (*gate, way_m)
 
 
 def _ways_of(search: PoseSearch) -> tuple[Path, ...]:

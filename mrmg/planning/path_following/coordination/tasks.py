@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from itertools import product
 from math import ceil, pi
 
@@ -99,7 +98,7 @@ def arrival_poses(problem: Problem, r: int, tour: Sequence[int]) -> np.ndarray:
     """Return (x, y, yaw) that robot r drives to at its legs' targets and its finish.
 
     That is the middle, and the heading that is wanted there; where the robot has no
-    room in that pose, the one in which it has most, to the target's edge, too.
+    room in that pose, the one in which it has most.
 
     Returns:
         Shape (L + 1, 3); 0 in the last row without a finish.
@@ -115,10 +114,7 @@ def arrival_poses(problem: Problem, r: int, tour: Sequence[int]) -> np.ndarray:
             own, spaces, pose[i], enough_m, corner
         ):
             robot = problem.scene.robots[r]
-            most = partial(roomiest_pose, problem.scene, robot, poses, enough_m)
-            best = most(edge_m=margin_m)
-            if best is None or best.room_m < margin_m:  # it keeps less in an opening
-                best = most()
+            best = roomiest_pose(problem.scene, robot, poses, enough_m)
             pose[i] = best.pose if best else pose[i]
     return pose
 
