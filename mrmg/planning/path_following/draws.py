@@ -32,9 +32,14 @@ tight take less than the roadmap's."""
 TIMED_SURCHARGES = (0.06, 0.0, 0.12)
 """The same where the makespan counts: who brakes hard and turns round needs more."""
 
-FEW_DRAWS = 4
-"""Draws where tours do not recharge. Where they do, twice as many, of which all but the
-first are for what smoothed paths take, made missions on outside maps 0.8 % cheaper."""
+RECHARGE_DRAWS, RECHARGE_GOALS = 8, 320
+"""Draws that follow where tours recharge, and the goals in all of them, at most ..."""
+
+FIRST_RECHARGE_DRAW = 1_000_000
+"""... and the number from which on these are numbered."""
+
+CLEARLY_BETTER = 1.003
+"""Ratio of costs from which on it is no error of judgement that tours are better."""
 
 DRIVEN_SHARE = 1.01
 """Energy of driving, over that of the smoothed paths that tours are judged by."""
@@ -80,29 +85,41 @@ def drawn_tours(
 ) -> tuple[list[Routing], int]:
     """Return the different tours of several draws, and how many draws there were.
 
-    Those that look best come first. If the first ones recharge, the other draws are for
+    Those that look best come first. If these recharge, there are further draws, for
     energies that are as much below the roadmap's as the smoothed paths of these cost
-    less than those of the roadmap. Else few draws are enough.
+    less than those of the roadmap. Their tours count only if they look clearly better.
     """
-    first, others = _drawn(problem, request, draws[0]), draws[1:]
-    if not (first.feasible and _recharge(problem, first)):
-        others = others[: FEW_DRAWS - 1]
-    elif others:
-        driven_J = DRIVEN_SHARE * path_cost_J(problem, first)
-        surcharge = driven_J / _roadmap_cost_J(problem, first) - 1.0
-        others = [replace(one, surcharge=surcharge) for one in others]
-    drawn = [first, *_all_drawn(problem, request, others)]
-    found = {tours.tours: tours for tours in drawn if tours.feasible}
-    ranked = [*found.values()]
-    if len(ranked) > 1:
-        ranked.sort(key=lambda tours: path_cost_J(problem, tours))
-    return ranked, len(drawn)
+    if len(draws) == 1:
+        only = _drawn(problem, request, draws[0])
+        return [only] if only.feasible else [], 1
+    cost_J: dict[Tours, float] = {}
+    found: dict[Tours, Routing] = {}
+
+    def take(draws: Sequence[Draw], share: float) -> None:
+        for tours in _all_drawn(problem, request, draws):
+            if tours.feasible and tours.tours not in found:
+                found[tours.tours] = tours
+                cost_J[tours.tours] = share * path_cost_J(problem, tours)
+
+    take(draws, 1.0)
+    if not found:
+        return [], len(draws)
+    best = min(cost_J, key=cost_J.__getitem__)
+    goals, more = problem.mission.targets.goals, 0
+    if any(target >= goals for tour in best for target in tour):
+        more = recharge_draws(goals)
+        first = FIRST_RECHARGE_DRAW + RECHARGE_DRAWS * draws[0].number
+        driven = cost_J[best] / _roadmap_cost_J(problem, found[best])
+        surcharge = DRIVEN_SHARE * driven - 1.0
+        further = (Draw.of(number, False) for number in range(first, first + more))
+        take([replace(one, surcharge=surcharge) for one in further], CLEARLY_BETTER)
+    ranked = sorted(cost_J, key=cost_J.__getitem__)
+    return [found[tours] for tours in ranked], len(draws) + more
 
 
-def _recharge(problem: Problem, routing: Routing) -> bool:
-    """Return whether tours lead to stations."""
-    goals = problem.mission.targets.goals
-    return any(target >= goals for tour in routing.tours for target in tour)
+def recharge_draws(goals: int) -> int:
+    """Return how many draws follow where tours through so many goals recharge."""
+    return min(RECHARGE_DRAWS, RECHARGE_GOALS // max(1, goals))
 
 
 def _all_drawn(

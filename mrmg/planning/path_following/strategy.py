@@ -35,8 +35,8 @@ TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
 """Shares of the time limit that the tours of successive attempts may take: driving
 takes longer than by the roadmap where robots turn much or get in each other's way."""
 
-DRAWS_PER_ATTEMPT = 8
-"""Tours drawn by each attempt after the first one at most; the best are followed."""
+DRAWS_PER_ATTEMPT = 4
+"""Tours drawn by each attempt after the first one, of which the best are followed."""
 
 FURTHER_DRAWS = (1, 3)
 """Draws that the first attempt goes on with where its first one fails: the next is of

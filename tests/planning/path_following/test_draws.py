@@ -17,7 +17,7 @@ from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import Routing
 
 PARAMS = PlannerParams(samples=600)
-PLAIN = [Draw(number, 0.0, 0.0) for number in range(6)]
+PLAIN = [Draw(number, 0.0, 0.0) for number in range(4)]
 
 
 def request() -> Request:
@@ -38,18 +38,18 @@ def test_tours_that_recharge_are_drawn_for_what_smoothed_paths_take(
 
     monkeypatch.setattr(draws, "_drawn", spy)
     found, calls = drawn_tours(problem, request(), PLAIN)
-    assert calls == len(seen) == len(PLAIN)
+    further = draws.recharge_draws(problem.mission.targets.goals)
+    assert 0 < further <= draws.RECHARGE_DRAWS
+    assert calls == len(seen) == len(PLAIN) + further
     assert {tours.tours for tours in found} == {tours.tours for _, tours in seen}
-    assert seen[0][0] == 0.0
-    surcharges = {surcharge for surcharge, _ in seen[1:]}
-    assert len(surcharges) == 1
-    assert -0.2 < surcharges.pop() < 0.0
-    for _, tours in seen[1:]:
+    assert {surcharge for surcharge, _ in seen[: len(PLAIN)]} == {0.0}
+    for surcharge, tours in seen[len(PLAIN) :]:
+        assert surcharge == seen[-1][0] < 0.0
         smooth_J = draws.path_cost_J(problem, tours)
         assert tours.cost_J == pytest.approx(smooth_J, rel=0.04)
 
 
-def test_where_nobody_recharges_few_draws_are_enough() -> None:
+def test_where_nobody_recharges_nothing_is_measured() -> None:
     scene = mrmg.load_scene("scene1")
     ample = [
         replace(r, battery=replace(r.battery, capacity_J=1e9, start_J=1e9))
@@ -57,7 +57,7 @@ def test_where_nobody_recharges_few_draws_are_enough() -> None:
     ]
     problem = state_mission(replace(scene, robots=tuple(ample)), 0, PARAMS)
     found, calls = drawn_tours(problem, request(), PLAIN)
-    assert calls == draws.FEW_DRAWS < len(PLAIN)
+    assert calls == len(PLAIN)
     assert len({tours.tours for tours in found}) == len(found)
     costs_J = [draws.path_cost_J(problem, tours) for tours in found]
     assert costs_J == sorted(costs_J)
@@ -68,3 +68,10 @@ def test_one_draw_is_followed_as_it_is() -> None:
     found, calls = drawn_tours(problem, request(), PLAIN[:1])
     assert calls == len(found) == 1
     assert np.isfinite(found[0].cost_J)
+
+
+def test_there_are_fewer_further_draws_the_more_goals_there_are() -> None:
+    counts = [draws.recharge_draws(goals) for goals in range(400)]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[16] == draws.RECHARGE_DRAWS
+    assert counts[-1] == 0
