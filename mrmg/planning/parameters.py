@@ -95,7 +95,7 @@ class PlannerParams:
         router: name and parameters of the router; the planner guided_tree takes nrpa.
         dt_s: step of the motion model, dt [s].
         trees: attempts at most; one that fails is followed by one with new draws.
-        improvements: further attempts after the first plan; the cheapest plan counts.
+        improvements: attempts after the one with the first plan; the best plan counts.
         follow_paths: follow paths along tours, without a search where that succeeds.
         soc_margin: share of every battery's capacity that plans leave above the reserve
             where they can, for robots that take more than their models say. With a

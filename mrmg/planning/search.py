@@ -94,8 +94,8 @@ class Search:
         An interrupt during a time limit ends the search as if the limit were reached,
         provided there is a plan to keep.
         """
-        found = 0
-        if self._enough(found):
+        found, further = 0, -1  # plans, and attempts since the first of them
+        if self._enough(further):
             return None
         try:
             for attempt in self._attempts():
@@ -107,8 +107,9 @@ class Search:
                 times = attempt.found_at or repeat(time.perf_counter())
                 plans = zip(times, attempt.plans, strict=False)
                 found += any([self._take(*each) for each in plans])
-                self.on_progress(self._fraction(found), counted(found, "plan"))
-                if self._enough(found):
+                further += found > 0
+                self.on_progress(self._fraction(further), counted(found, "plan"))
+                if self._enough(further):
                     break
                 if (
                     self.attempts == 1
@@ -174,17 +175,17 @@ class Search:
         self.on_improvement(improvement)
         return True
 
-    def _enough(self, found: int) -> bool:
+    def _enough(self, further: int) -> bool:
         params, number = self.params, self.attempts
         if params.budget_s is not None:
-            hopeless = found == 0 and number >= HOPELESS * params.trees
+            hopeless = further < 0 and number >= HOPELESS * params.trees
             return self.statistics.elapsed() > params.budget_s or hopeless
-        return found > params.improvements or number >= params.trees
+        return further >= params.improvements or number >= params.trees
 
-    def _fraction(self, found: int) -> float:
+    def _fraction(self, further: int) -> float:
         params, number = self.params, self.attempts
         if params.budget_s is not None:
             done = self.statistics.elapsed() / params.budget_s
         else:
-            done = max(number / params.trees, found / (1 + params.improvements))
+            done = max(number / params.trees, (1 + further) / (1 + params.improvements))
         return 0.1 + 0.9 * min(done, 1.0)

@@ -58,7 +58,7 @@ def made(number: int, halt: np.ndarray) -> Attempt:
 @pytest.mark.parametrize("workers", [1, 2, 5])
 @pytest.mark.parametrize(
     ("trees", "improvements", "best", "counted"),
-    [(10, 2, 2, 4), (10, 10, 9, 10), (3, 9, 2, 3), (1, 0, 0, 1)],
+    [(10, 1, 0, 2), (10, 2, 2, 3), (10, 10, 9, 10), (3, 9, 2, 3), (1, 0, 0, 1)],
 )
 def test_attempts_count_in_order_whatever_the_workers(
     workers: int, trees: int, improvements: int, best: int, counted: int
