@@ -97,6 +97,7 @@ class Attempt:
         tours_found: whether the router found any.
         blocked: what stood in the way of motions along them; "" if nothing did.
         refused: why motions along them are no plan, of those that are nearest to one.
+        tight: whether its plans keep less than the margins that are wanted.
     """
 
     plans: Sequence[Plan] = ()
@@ -106,6 +107,7 @@ class Attempt:
     tours_found: bool = True
     blocked: str = ""
     refused: Refusal | None = None
+    tight: bool = False
 
     def after(self, failed: Attempt) -> Attempt:
         """Return this attempt with what one before it has found out."""

@@ -268,6 +268,7 @@ class _Planning:
             kept = self.scene
             if not (
                 found.plans
+                or not search.tight  # a plan keeps the margins that are wanted
                 or longer
                 or halt[0]
                 or self.params.planner == GUIDED_TREE  # it has one search of some work
@@ -303,7 +304,7 @@ class _Planning:
                 return None
             return self._in_time(partial(proofs.reason, tours_missing=missing))
 
-        return Search(
+        search = Search(
             attempt=attempt,
             params=self.params,
             statistics=self.statistics,
@@ -313,6 +314,7 @@ class _Planning:
             proof=proof,
             preference=Preference.of(self.scene),
         )
+        return search
 
     def _tried_tightly(
         self, failed: Attempt, problem: Problem | None, request: Request
@@ -324,7 +326,8 @@ class _Planning:
         if problem is None:
             return failed
         found = self.planner(problem, request).after(failed)
-        return replace(found, blocked=failed.blocked or found.blocked)
+        blocked = failed.blocked or found.blocked
+        return replace(found, blocked=blocked, tight=True)
 
     def _in_time(self, call: Callable[[], Result]) -> Result | None:
         """Return what a call returns, or None once the budget is over."""

@@ -54,7 +54,9 @@ class Search:
             whether no tours were found, and whether attempts would go on. Called once
             an attempt has failed.
         preference: what plans are compared by.
-        best: the best plan so far that is in time.
+        best: the best plan so far that is in time; one that keeps the margins wanted is
+            better than any that does not.
+        tight: whether no plan so far keeps them.
         earliest_s: when the earliest of all plans is over.
         begun: number of attempts that were begun.
         attempts: number of those that have ended.
@@ -74,6 +76,7 @@ class Search:
     proof: Callable[[bool, bool], str | None]
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
+    tight: bool = True
     earliest_s: float = math.inf
     begun: int = 0
     attempts: int = 0
@@ -106,7 +109,7 @@ class Search:
                 self.statistics.add(dict(attempt.counts), attempt.routing_s)
                 times = attempt.found_at or repeat(time.perf_counter())
                 plans = zip(times, attempt.plans, strict=False)
-                found += any([self._take(*each) for each in plans])
+                found += any([self._take(*each, attempt.tight) for each in plans])
                 further += found > 0
                 self.on_progress(self._fraction(further), counted(found, "plan"))
                 if self._enough(further):
@@ -153,17 +156,17 @@ class Search:
             done = finished(pending, GRACE_S)
         return done
 
-    def _take(self, found_at: float, plan: Plan) -> bool:
+    def _take(self, found_at: float, plan: Plan, tight: bool) -> bool:
         """Keep a plan if it is the best so far; return whether it is in time."""
-        time_s = found_at - self.statistics.started
+        time_s, rank = found_at - self.statistics.started, self.preference.rank
         self.earliest_s = min(self.earliest_s, plan.makespan_s)
         if self.preference.late_s(plan):
             return False
         if self.best is None:
             self.statistics.time_s["first_solution"] = time_s
-        elif self.preference.rank(plan) >= self.preference.rank(self.best):
+        elif (tight, rank(plan)) >= (self.tight, rank(self.best)):
             return True
-        self.best = plan
+        self.best, self.tight = plan, tight
         improvement = Improvement(
             time_s=time_s,
             cost_J=plan.cost_J,

@@ -13,6 +13,9 @@ import pytest
 import mrmg
 from mrmg.errors import SceneError
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.path_following.strategy import path_following
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import PlanResult, PlanStatus
 from mrmg.scene.types import Scene
 
@@ -55,6 +58,33 @@ def test_numbers_of_numpy_are_as_good_as_those_of_python() -> None:
     params = PlannerParams(samples=np.int64(600))  # type: ignore[arg-type]
     seed: Any = np.arange(2)[1]
     assert digest(plan_mission(scene, seed=seed, params=params)) == digest(plain)
+
+
+# --- margins -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("failing", "tries"), [((1,), ()), ((0, 1), (1,))])
+def test_margins_are_given_up_only_where_no_plan_keeps_them(
+    failing: tuple[int, ...], tries: tuple[int, ...]
+) -> None:
+    wanted_m = list[float]()
+    tight = list[int]()
+
+    def planner(problem: Problem, request: Request) -> Attempt:
+        spacing_m = float(problem.mission.fleet["spacing"].max())
+        wanted_m.append(spacing_m)
+        if spacing_m < wanted_m[0]:
+            tight.append(request.number)
+            return Attempt(tours_found=True)
+        if request.number in failing:
+            return Attempt(tours_found=True)
+        return path_following(problem, request)
+
+    scene, params = edge_scene("two_swap"), PlannerParams(improvements=2)
+    result = plan_mission(scene, params=params, planner=planner)
+    assert tuple(tight) == tries
+    assert result.plan is not None
+    assert {spacing_m for _, spacing_m in result.plan.margins.values()} == {0.5}
 
 
 # --- limits ------------------------------------------------------------------------

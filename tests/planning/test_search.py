@@ -73,6 +73,17 @@ def test_attempts_count_in_order_whatever_the_workers(
     assert costs[-1] == found.cost_J
 
 
+def test_plans_that_keep_the_margins_wanted_are_better_than_others() -> None:
+    def some_tight(number: int, halt: np.ndarray) -> Attempt:
+        return replace(made(number, halt), tight=number in (0, 4))
+
+    work = search(PlannerParams(trees=6, improvements=6), 1, some_tight)
+    found: Any = work.run()
+    assert found.number == 5
+    costs = [improvement.cost_J for improvement in work.statistics.improvements]
+    assert costs == [90.0, 70.0, 65.0]
+
+
 def test_a_time_limit_halts_what_is_under_way() -> None:
     def endless(number: int, halt: np.ndarray) -> Attempt:
         while number and not halt[0]:
