@@ -38,9 +38,6 @@ RECHARGE_DRAWS, RECHARGE_GOALS = 8, 320
 FIRST_RECHARGE_DRAW = 1_000_000
 """... and the number from which on these are numbered."""
 
-CLEARLY_BETTER = 1.003
-"""Ratio of costs from which on it is no error of judgement that tours are better."""
-
 DRIVEN_SHARE = 1.01
 """Energy of driving, over that of the smoothed paths that tours are judged by."""
 
@@ -87,7 +84,7 @@ def drawn_tours(
 
     Those that look best come first. If these recharge, there are further draws, for
     energies that are as much below the roadmap's as the smoothed paths of these cost
-    less than those of the roadmap. Their tours count only if they look clearly better.
+    less than those of the roadmap.
     """
     if len(draws) == 1:
         only = _drawn(problem, request, draws[0])
@@ -95,13 +92,13 @@ def drawn_tours(
     cost_J: dict[Tours, float] = {}
     found: dict[Tours, Routing] = {}
 
-    def take(draws: Sequence[Draw], share: float) -> None:
+    def take(draws: Sequence[Draw]) -> None:
         for tours in _all_drawn(problem, request, draws):
             if tours.feasible and tours.tours not in found:
                 found[tours.tours] = tours
-                cost_J[tours.tours] = share * path_cost_J(problem, tours)
+                cost_J[tours.tours] = path_cost_J(problem, tours)
 
-    take(draws, 1.0)
+    take(draws)
     if not found:
         return [], len(draws)
     best = min(cost_J, key=cost_J.__getitem__)
@@ -112,7 +109,7 @@ def drawn_tours(
         driven = cost_J[best] / _roadmap_cost_J(problem, found[best])
         surcharge = DRIVEN_SHARE * driven - 1.0
         further = (Draw.of(number, False) for number in range(first, first + more))
-        take([replace(one, surcharge=surcharge) for one in further], CLEARLY_BETTER)
+        take([replace(one, surcharge=surcharge) for one in further])
     ranked = sorted(cost_J, key=cost_J.__getitem__)
     return [found[tours] for tours in ranked], len(draws) + more
 
