@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntFlag
 
 import numpy as np
 
@@ -83,6 +84,19 @@ class Request:
         return make_plan(problem, self.seed, self.params, trajectories, tours)
 
 
+class GivenUp(IntFlag):
+    """Margins that are wanted, and that plans keep less than; the least is the best.
+
+    Attributes:
+        CHARGE: of batteries.
+        DISTANCES: from obstacles, or between robots.
+    """
+
+    NONE = 0
+    CHARGE = 1
+    DISTANCES = 2
+
+
 @dataclass(frozen=True, slots=True)
 class Attempt:
     """What one attempt gave.
@@ -97,7 +111,7 @@ class Attempt:
         tours_found: whether the router found any.
         blocked: what stood in the way of motions along them; "" if nothing did.
         refused: why motions along them are no plan, of those that are nearest to one.
-        tight: whether its plans keep less than the margins that are wanted.
+        given_up: margins that its plans keep less than.
     """
 
     plans: Sequence[Plan] = ()
@@ -107,7 +121,7 @@ class Attempt:
     tours_found: bool = True
     blocked: str = ""
     refused: Refusal | None = None
-    tight: bool = False
+    given_up: GivenUp = GivenUp.NONE
 
     def after(self, failed: Attempt) -> Attempt:
         """Return this attempt with what one before it has found out."""

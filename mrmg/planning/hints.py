@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from mrmg.compared import compared
+from mrmg.energy.metering import visits_and_energy
 from mrmg.planning.bound.exact_tours import are_few
 from mrmg.planning.endings import listed
 from mrmg.plans import Plan
@@ -90,6 +92,33 @@ def _on_narrow_passages(plan: Plan) -> Iterator[str]:
                 f"{robot} keeps less than its margin of {plan.margins[robot][0]:g} m "
                 f"from obstacles where no wider way leads on: {places}"
             )
+
+
+def on_charge(scene: Scene, plan: Plan, wanted: float) -> Iterator[str]:
+    """Yield which robots leave less of their batteries than was asked for.
+
+    Args:
+        scene: the mission.
+        plan: the answer.
+        wanted: share of every battery's capacity, above its reserve.
+    """
+    left = {}
+    for trajectory in plan.trajectories:
+        robot = trajectory.robot
+        battery = scene.robot(robot).battery
+        _, content_J, _ = visits_and_energy(scene, trajectory, plan.tours[robot])
+        spare_J = float(content_J.min()) - battery.reserve_J
+        left[robot] = spare_J / battery.capacity_J
+    less = [robot for robot, share in left.items() if share < wanted]
+    if less:
+        least, limit = compared(100.0 * min(left.values()), 100.0 * wanted)
+        what = f"leave as little as {least} % of their batteries"
+        if len(less) == 1:
+            what = f"leaves {least} % of its battery"
+        yield (
+            f"{listed(less)} {what} above the reserve instead of {limit} %: no plan was "
+            "found that leaves more"
+        )
 
 
 def _on_spacing(wanted: Mapping[str, float], plan: Plan) -> Iterator[str]:

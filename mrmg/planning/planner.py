@@ -15,12 +15,12 @@ from mrmg import extensions
 from mrmg.background import Result, within
 from mrmg.errors import UsageError, require_types, whole
 from mrmg.planning import planners, routers
-from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.attempt import Attempt, GivenUp, Request
 from mrmg.planning.bounding import bounds_beside
 from mrmg.planning.diagnosis import Proofs, why_in_time, why_no_plan
 from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
-from mrmg.planning.hints import INTERRUPTED, hints_on
+from mrmg.planning.hints import INTERRUPTED, hints_on, on_charge
 from mrmg.planning.margins_kept import with_least_spacing, with_margins
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
 from mrmg.planning.planners import Planner
@@ -223,7 +223,7 @@ class _Planning:
             )
         if bounding is not None:
             self._in_time(bounding.result)
-        margins = self.params.margins
+        margins, spent = self.params.margins, GivenUp.CHARGE in search.given_up
         wanted = {one.id: margins_of(one, margins)[1] for one in self.scene.robots}
         return PlanResult(
             status=PlanStatus.SOLVED,
@@ -232,6 +232,7 @@ class _Planning:
             statistics=self.statistics.as_dict(),
             hints=(
                 *([INTERRUPTED] if search.interrupted else []),
+                *(on_charge(self.scene, best, self.params.soc_margin) if spent else ()),
                 *hints_on(
                     self.scene,
                     best,
@@ -268,7 +269,7 @@ class _Planning:
             kept = self.scene
             if not (
                 found.plans
-                or not search.tight  # a plan keeps the margins that are wanted
+                or GivenUp.DISTANCES not in search.given_up
                 or longer
                 or halt[0]
                 or self.params.planner == GUIDED_TREE  # it has one search of some work
@@ -326,8 +327,11 @@ class _Planning:
         if problem is None:
             return failed
         found = self.planner(problem, request).after(failed)
-        blocked = failed.blocked or found.blocked
-        return replace(found, blocked=blocked, tight=True)
+        return replace(
+            found,
+            blocked=failed.blocked or found.blocked,
+            given_up=found.given_up | GivenUp.DISTANCES,
+        )
 
     def _in_time(self, call: Callable[[], Result]) -> Result | None:
         """Return what a call returns, or None once the budget is over."""

@@ -21,7 +21,7 @@ from mrmg import interruption
 from mrmg.background import finished, in_background
 from mrmg.counted import counted
 from mrmg.planning.assembly import Refusal
-from mrmg.planning.attempt import Attempt, least_refusal
+from mrmg.planning.attempt import Attempt, GivenUp, least_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.statistics import Improvement, Statistics
@@ -56,7 +56,7 @@ class Search:
         preference: what plans are compared by.
         best: the best plan so far that is in time; one that keeps the margins wanted is
             better than any that does not.
-        tight: whether no plan so far keeps them.
+        given_up: margins that it keeps less than; all while there is none.
         earliest_s: when the earliest of all plans is over.
         begun: number of attempts that were begun.
         attempts: number of those that have ended.
@@ -76,7 +76,7 @@ class Search:
     proof: Callable[[bool, bool], str | None]
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
-    tight: bool = True
+    given_up: GivenUp = GivenUp.CHARGE | GivenUp.DISTANCES
     earliest_s: float = math.inf
     begun: int = 0
     attempts: int = 0
@@ -109,7 +109,7 @@ class Search:
                 self.statistics.add(dict(attempt.counts), attempt.routing_s)
                 times = attempt.found_at or repeat(time.perf_counter())
                 plans = zip(times, attempt.plans, strict=False)
-                found += any([self._take(*each, attempt.tight) for each in plans])
+                found += any([self._take(*each, attempt.given_up) for each in plans])
                 further += found > 0
                 self.on_progress(self._fraction(further), counted(found, "plan"))
                 if self._enough(further):
@@ -156,7 +156,7 @@ class Search:
             done = finished(pending, GRACE_S)
         return done
 
-    def _take(self, found_at: float, plan: Plan, tight: bool) -> bool:
+    def _take(self, found_at: float, plan: Plan, given_up: GivenUp) -> bool:
         """Keep a plan if it is the best so far; return whether it is in time."""
         time_s, rank = found_at - self.statistics.started, self.preference.rank
         self.earliest_s = min(self.earliest_s, plan.makespan_s)
@@ -164,9 +164,9 @@ class Search:
             return False
         if self.best is None:
             self.statistics.time_s["first_solution"] = time_s
-        elif (tight, rank(plan)) >= (self.tight, rank(self.best)):
+        elif (given_up, rank(plan)) >= (self.given_up, rank(self.best)):
             return True
-        self.best, self.tight = plan, tight
+        self.best, self.given_up = plan, given_up
         improvement = Improvement(
             time_s=time_s,
             cost_J=plan.cost_J,

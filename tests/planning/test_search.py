@@ -13,7 +13,7 @@ import pytest
 
 import mrmg
 from mrmg.planning import Improvement, PlannerParams, plan_mission
-from mrmg.planning.attempt import Attempt
+from mrmg.planning.attempt import Attempt, GivenUp
 from mrmg.planning.search import Search
 from mrmg.planning.statistics import Statistics, gap_of
 from mrmg.plans import Plan
@@ -75,7 +75,8 @@ def test_attempts_count_in_order_whatever_the_workers(
 
 def test_plans_that_keep_the_margins_wanted_are_better_than_others() -> None:
     def some_tight(number: int, halt: np.ndarray) -> Attempt:
-        return replace(made(number, halt), tight=number in (0, 4))
+        given_up = {0: GivenUp.DISTANCES, 4: GivenUp.CHARGE}.get(number, GivenUp.NONE)
+        return replace(made(number, halt), given_up=given_up)
 
     work = search(PlannerParams(trees=6, improvements=6), 1, some_tight)
     found: Any = work.run()

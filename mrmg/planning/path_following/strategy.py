@@ -7,13 +7,13 @@ they must leave in batteries.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 
-from mrmg.planning.attempt import Attempt, Request, least_refusal
+from mrmg.planning.attempt import Attempt, GivenUp, Request, least_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import rounds_of
@@ -196,7 +196,19 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
     counts = {"coordinated": 1, "router_calls": 1}
-    return Attempt(plans, found_at, routing_s, counts, refused=refused)
+    given_up = _given_up(problem, request, plans)
+    return Attempt(
+        plans, found_at, routing_s, counts, refused=refused, given_up=given_up
+    )
+
+
+def _given_up(problem: Problem, request: Request, plans: Sequence[Plan]) -> GivenUp:
+    """Return whether plans of a problem leave less in batteries than is wanted."""
+    if problem.soc_margin >= request.params.soc_margin:
+        return GivenUp.NONE
+    wanted = problem.with_soc_margin(request.params.soc_margin)
+    kept = all(request.plan(wanted, one.trajectories, one.tours) for one in plans)
+    return GivenUp.NONE if kept else GivenUp.CHARGE
 
 
 def follow_paths(
@@ -250,5 +262,13 @@ def follow_paths(
         ):
             plans.append(plan)
             found_at.append(time.perf_counter())
-    counts = {"path_following_plans": driven, "router_calls": calls}
-    return Attempt(plans, found_at, routing_s, counts, bool(choice), blocked, refused)
+    return Attempt(
+        plans,
+        found_at,
+        routing_s,
+        counts={"path_following_plans": driven, "router_calls": calls},
+        tours_found=bool(choice),
+        blocked=blocked,
+        refused=refused,
+        given_up=_given_up(problem, request, plans),
+    )

@@ -18,6 +18,7 @@ import pytest
 import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.planning import Attempt, PlannerParams, Problem, Request
+from mrmg.planning.attempt import GivenUp
 from mrmg.planning.path_following import strategy
 from mrmg.planning.path_following.coordination.rounds import (
     COARSER,
@@ -177,12 +178,16 @@ def test_plans_leave_charge_to_spare(soc_margin: float) -> None:
     for plan in found.plans:
         assert least_share(problem.scene, plan) >= soc_margin
     assert found.plans
+    assert found.given_up == GivenUp.NONE
 
 
 def test_who_cannot_spare_charge_is_planned_for_all_the_same() -> None:
     problem = problem_of("station_needed")
     params = replace(PARAMS, soc_margin=0.9)
-    assert path_following(problem, request(params=params)).plans
+    for way in WAYS:
+        found = way(problem, request(params=params))
+        assert found.plans
+        assert found.given_up == GivenUp.CHARGE
     for way in (along_paths, search_motions):
         spared = problem.with_soc_margin(0.9)
         assert not way(spared, request(params=params)).plans
