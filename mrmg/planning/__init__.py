@@ -1,10 +1,10 @@
 """From a scene to a plan: roadmap, routers, planners.
 
-For planners and routers of your own: `Planner`, `Problem`, `Request` and `Attempt`;
-`Router`, `RoutingProblem` and `Routing`.
+For planners and routers of your own: `Planner`, `Problem`, `Request`, `Attempt` and
+`GivenUp`; `Router`, `RoutingProblem` and `Routing`.
 """
 
-from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.attempt import Attempt, GivenUp, Request
 from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
 from mrmg.planning.planner import plan_mission
 from mrmg.planning.planners import Planner
@@ -16,6 +16,7 @@ from mrmg.planning.statistics import Improvement
 
 __all__ = [
     "Attempt",
+    "GivenUp",
     "Improvement",
     "PROFILES",
     "Planner",
