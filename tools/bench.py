@@ -290,14 +290,13 @@ def planned(
 
 
 def value_after(statistics: Mapping[str, Any], time_s: float | None) -> float:
-    """Return the objective of the best plan by a time, or of the first one."""
-    found = statistics["improvements"]
-    values = [
-        row["objective"]["value"]
-        for row in found
-        if time_s is not None and row["time_s"] <= time_s
-    ]
-    return float(min(values, default=found[0]["objective"]["value"]))
+    """Return the objective of the best plan by a time, or of the first one.
+
+    The last is the best: one that keeps more of its margins may cost more.
+    """
+    first, *later = statistics["improvements"]
+    in_time = [one for one in later if time_s is not None and one["time_s"] <= time_s]
+    return float([first, *in_time][-1]["objective"]["value"])
 
 
 def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:

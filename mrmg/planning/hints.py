@@ -116,8 +116,8 @@ def on_charge(scene: Scene, plan: Plan, wanted: float) -> Iterator[str]:
         if len(less) == 1:
             what = f"leaves {least} % of its battery"
         yield (
-            f"{listed(less)} {what} above the reserve instead of {limit} %: no plan was "
-            "found that leaves more"
+            f"{listed(less)} {what} above the reserve instead of {limit} %: no plan "
+            "was found that leaves more"
         )
 
 

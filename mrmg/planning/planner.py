@@ -276,15 +276,11 @@ class _Planning:
                 or proof(not found.tours_found, True)
             ):
                 found = self._tried_tightly(found, tight(), request)
-                kept = nearer()
+                kept = with_least_spacing(self.scene, margins)
             found = on_the_map(found, problem, self.scene, self.params)
             stated = STATES_NONE if kept is not self.scene else margins
             plans = [with_margins(kept, plan, stated) for plan in found.plans]
             return replace(found, plans=plans)
-
-        @cache
-        def nearer() -> Scene:
-            return with_least_spacing(self.scene, margins)
 
         @cache
         def tight() -> Problem | None:

@@ -262,13 +262,8 @@ def follow_paths(
         ):
             plans.append(plan)
             found_at.append(time.perf_counter())
+    counts = {"path_following_plans": driven, "router_calls": calls}
+    given_up = _given_up(problem, request, plans)
     return Attempt(
-        plans,
-        found_at,
-        routing_s,
-        counts={"path_following_plans": driven, "router_calls": calls},
-        tours_found=bool(choice),
-        blocked=blocked,
-        refused=refused,
-        given_up=_given_up(problem, request, plans),
+        plans, found_at, routing_s, counts, bool(choice), blocked, refused, given_up
     )
