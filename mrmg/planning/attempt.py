@@ -85,10 +85,11 @@ class Request:
 
 
 class GivenUp(IntFlag):
-    """Margins that are wanted, and that plans keep less than; the least is the best.
+    """Margins that plans keep less of than is wanted; the smaller value is the better.
 
     Attributes:
-        CHARGE: of batteries.
+        NONE: all are kept.
+        CHARGE: `PlannerParams.soc_margin`, of batteries.
         DISTANCES: from obstacles, or between robots.
     """
 
@@ -111,7 +112,7 @@ class Attempt:
         tours_found: whether the router found any.
         blocked: what stood in the way of motions along them; "" if nothing did.
         refused: why motions along them are no plan, of those that are nearest to one.
-        given_up: margins that its plans keep less than.
+        given_up: margins that its plans keep less of than is wanted.
     """
 
     plans: Sequence[Plan] = ()

@@ -56,7 +56,7 @@ class Search:
         preference: what plans are compared by.
         best: the best plan so far that is in time; one that keeps the margins wanted is
             better than any that does not.
-        given_up: margins that it keeps less than; all while there is none.
+        given_up: margins that it gave up; all while there is none.
         earliest_s: when the earliest of all plans is over.
         begun: number of attempts that were begun.
         attempts: number of those that have ended.
