@@ -59,7 +59,8 @@ class Search:
         given_up: margins that it gave up; all while there is none.
         earliest_s: when the earliest of all plans is over.
         begun: number of attempts that were begun.
-        attempts: number of those that have ended.
+        attempts: number of those that have counted.
+        further: how many of these came after the first plan; -1 while there is none.
         tours_found: whether the router found tours in any of them.
         blocked: what stood in the way of the last motions along tours; "" if nothing
             did.
@@ -80,6 +81,7 @@ class Search:
     earliest_s: float = math.inf
     begun: int = 0
     attempts: int = 0
+    further: int = -1
     tours_found: bool = False
     blocked: str = ""
     refused: Refusal | None = None
@@ -97,8 +99,8 @@ class Search:
         An interrupt during a time limit ends the search as if the limit were reached,
         provided there is a plan to keep.
         """
-        found, further = 0, -1  # plans, and attempts since the first of them
-        if self._enough(further):
+        found, counted_at = 0, -math.inf
+        if self._enough():
             return None
         try:
             for attempt in self._attempts():
@@ -107,12 +109,14 @@ class Search:
                 self.blocked = attempt.blocked or self.blocked
                 self.refused = least_refusal(attempt.refused, self.refused)
                 self.statistics.add(dict(attempt.counts), attempt.routing_s)
-                times = attempt.found_at or repeat(time.perf_counter())
+                now = time.perf_counter()
+                times = [max(at, counted_at) for at in attempt.found_at] or repeat(now)
+                counted_at = now
                 plans = zip(times, attempt.plans, strict=False)
                 found += any([self._take(*each, attempt.given_up) for each in plans])
-                further += found > 0
-                self.on_progress(self._fraction(further), counted(found, "plan"))
-                if self._enough(further):
+                self.further += found > 0
+                self.on_progress(self._fraction(), counted(found, "plan"))
+                if self._enough():
                     break
                 if (
                     self.attempts == 1
@@ -137,7 +141,7 @@ class Search:
         free = self.params.budget_s is not None
         pending: list[Future[Attempt]] = []
         while True:
-            while len(pending) < self.workers:
+            while len(pending) < min(self.workers, self._left()):
                 attempt = partial(self.attempt, self.begun, self.halt)
                 pending.append(in_background(attempt))
                 self.begun += 1
@@ -178,17 +182,27 @@ class Search:
         self.on_improvement(improvement)
         return True
 
-    def _enough(self, further: int) -> bool:
+    def _left(self) -> float:
+        """Return how many attempts will still count, as far as that is known."""
+        params = self.params
+        if params.budget_s is not None:
+            return math.inf
+        left = params.improvements - self.further if self.further >= 0 else math.inf
+        return min(left, params.trees - self.attempts)
+
+    def _enough(self) -> bool:
         params, number = self.params, self.attempts
         if params.budget_s is not None:
-            hopeless = further < 0 and number >= HOPELESS * params.trees
+            hopeless = self.further < 0 and number >= HOPELESS * params.trees
             return self.statistics.elapsed() > params.budget_s or hopeless
-        return further >= params.improvements or number >= params.trees
+        return self._left() <= 0
 
-    def _fraction(self, further: int) -> float:
+    def _fraction(self) -> float:
         params, number = self.params, self.attempts
         if params.budget_s is not None:
             done = self.statistics.elapsed() / params.budget_s
         else:
-            done = max(number / params.trees, (1 + further) / (1 + params.improvements))
+            done = max(
+                number / params.trees, (1 + self.further) / (1 + params.improvements)
+            )
         return 0.1 + 0.9 * min(done, 1.0)

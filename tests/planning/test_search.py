@@ -73,6 +73,25 @@ def test_attempts_count_in_order_whatever_the_workers(
     assert costs[-1] == found.cost_J
 
 
+def test_no_attempts_are_begun_that_cannot_count() -> None:
+    for trees, improvements, needed in ((10, 1, 2), (2, 9, 2), (10, 3, 4)):
+        params = PlannerParams(trees=trees, improvements=improvements)
+        work = search(params, 2, lambda number, halt: made(0, halt))
+        work.run()
+        assert work.begun == needed
+
+
+def test_plans_are_there_when_they_count() -> None:
+    def swift_later(number: int, halt: np.ndarray) -> Attempt:
+        time.sleep(0.1 if number == 0 else 0.0)
+        plans: Any = [Priced(number, 9.0)] if number else []
+        return Attempt(plans, [time.perf_counter()] if number else ())
+
+    work = search(PlannerParams(trees=2, improvements=1), 2, swift_later)
+    assert work.run() is not None
+    assert work.statistics.improvements[0].time_s >= 0.1
+
+
 def test_plans_that_keep_the_margins_wanted_are_better_than_others() -> None:
     def some_tight(number: int, halt: np.ndarray) -> Attempt:
         given_up = {0: GivenUp.DISTANCES, 4: GivenUp.CHARGE}.get(number, GivenUp.NONE)
