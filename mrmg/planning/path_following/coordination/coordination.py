@@ -265,7 +265,8 @@ class _Planning:
     ) -> list[Motion] | None:
         """Return motions of all robots that may meet, None where one has none.
 
-        Each makes what room it can for those that found theirs before it.
+        Each makes what room it can for those that found theirs before it. One that
+        finds none is searched for harder, and without regard to them.
 
         Args:
             order: in which robots that have not been driven are looked at.
@@ -275,11 +276,12 @@ class _Planning:
         """
         harder = [one for one in ROUNDS if one.most > first.most]
         motions = [None if drive is None else drive.motion for drive in drives]
-        nobody = np.zeros(len(motions), bool)
+        nobody, unseen = np.zeros(len(motions), bool), [None] * len(motions)
         for r in order:
             for self.round in [first, *harder][:ROUNDS_ALONE]:
                 if motions[r] is None and not halt[0]:
-                    motions[r] = self.find(r, motions, nobody)
+                    seen = motions if self.round is first else unseen
+                    motions[r] = self.find(r, seen, nobody)
             if motions[r] is None:
                 return None
         self.round = first

@@ -4,8 +4,13 @@ H. Ma, D. Harabor, P. J. Stuckey, J. Li, S. Koenig: Searching with consistent
 prioritization for multi-agent path finding, AAAI 2019. Each node is a partial order of
 the robots and a motion for each of them that has no conflict with higher ones. Where
 two motions conflict, one child gives one robot priority and the other child the other
-one. The search goes depth first
-and back, so that it looks at every order that may matter.
+one. The search goes depth first. Where both orders of two robots lead nowhere, it goes
+back to the last choice between robots that had to do with it (P. Prosser: Hybrid
+algorithms for the constraint satisfaction problem, Computational Intelligence 9(3),
+1993), and from then on looks at these two first (C. Lecoutre, L. Sais, S. Tabary,
+V. Vidal: Reasoning from last conflict(s) in constraint programming, Artificial
+Intelligence 173, 2009): in a large fleet, most choices have nothing to do with each
+other.
 """
 
 from __future__ import annotations
@@ -100,46 +105,89 @@ def search_priorities(
     if not np.isfinite(conflict).any():
         return tuple(motions)
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
-    stack, seen = [_children(root, planning)], set()  # two may make room in turn
+    failed = np.zeros((robots, robots), np.int64)
+    # Why nodes led nowhere, nobody so far; two may make room in turn.
+    known: dict[tuple[object, ...], np.ndarray] = {}
+    stack = [_Choice(root, failed, planning)]
     most += planning.nodes
     while stack and planning.nodes < most and not halt[0]:
-        child = next(stack[-1], None)
+        choice = stack[-1]
+        child = next(choice.children, None)
         if child is None:
-            stack.pop()
+            failed[np.ix_(choice.pair, choice.pair)] = failed.max() + 1
+            known[stack.pop().key] = choice.reason
+            while stack and not choice.reason[stack[-1].pair].all():
+                known[stack.pop().key] = choice.reason
+            if stack:
+                stack[-1].reason |= choice.reason
         elif not np.isfinite(child.conflict).any():
             return child.motions
-        elif child.key not in seen:
-            seen.add(child.key)
-            stack.append(_children(child, planning))
+        elif child.key in known:
+            choice.reason |= known[child.key]
+        else:
+            known[child.key] = np.zeros(robots, bool)
+            stack.append(_Choice(child, failed, planning))
     return None
 
 
-def _pair(node: _Node) -> list[int]:
+class _Choice:
+    """Which of two robots in conflict has priority.
+
+    Attributes:
+        key: of the node.
+        pair: the robots.
+        reason: whether robot r has to do with why the orders before led nowhere, shape
+            (R,): the two, those above them, and what those met that found no motion.
+        children: nodes of the orders that are left.
+    """
+
+    def __init__(
+        self, node: _Node, failed: np.ndarray, planning: MotionPlanning
+    ) -> None:
+        self.key, self.pair = node.key, _pair(node, failed)
+        self.reason = np.zeros(len(failed), bool)
+        self.reason[self.pair] = True
+        self.reason |= node.above[self.pair].any(axis=0)
+        self.children = _children(node, self.pair, self.reason, planning)
+
+
+def _pair(node: _Node, failed: np.ndarray) -> list[int]:
     """Return the two robots whose motions conflict soonest.
 
-    Conflicts of robots that have been given priorities come before all others: so a
-    dead end is met soon after the choice that leads there. One that stands comes last,
-    else the robot with the longer motion.
+    Those of which both orders have led nowhere come before all others, the last ones
+    first, then conflicts of robots that have been given priorities: so a dead end is
+    met soon after the choice that leads there. One that stands comes last, else the
+    robot with the longer motion.
+
+    Args:
+        node: in which motions conflict.
+        failed: when the orders of each two robots led nowhere; 0 for never, (R, R).
     """
     ordered = node.above.any(axis=0) | node.above.any(axis=1)
     conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)
     if not np.isfinite(conflict).any():
         conflict = node.conflict
+    hard = np.where(np.isfinite(node.conflict), failed, 0)
+    if hard.any():
+        conflict = -hard
     pair = divmod(int(conflict.argmin()), len(node.motions))
     return sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
 
 
-def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
+def _children(
+    node: _Node, pair: Sequence[int], reason: np.ndarray, planning: MotionPlanning
+) -> Iterator[_Node]:
     """Yield the nodes in which one of two robots in conflict has priority.
 
     The second one is given priority first; the other order is looked at only where that
-    leaves as many conflicts, or leads nowhere.
+    leaves as many conflicts, or leads nowhere. `reason` receives who keeps a robot from
+    a motion.
     """
-    found, pair = [], _pair(node)
+    found = []
     for one, other in (pair, pair[::-1]):
         if node.above[other, one]:
             continue
-        child = _with_priority(node, one, other, planning)
+        child = _with_priority(node, one, other, reason, planning)
         if child is not None and child.cost < node.cost:
             yield child
         elif child is not None:
@@ -148,9 +196,12 @@ def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
 
 
 def _with_priority(
-    node: _Node, low: int, high: int, planning: MotionPlanning
+    node: _Node, low: int, high: int, reason: np.ndarray, planning: MotionPlanning
 ) -> _Node | None:
-    """Return the node in which one more robot has priority, None without a motion."""
+    """Return the node in which one more robot has priority.
+
+    None where a robot finds no motion; `reason` receives it and those above it.
+    """
     above = node.above.copy()
     upper = np.append(np.flatnonzero(above[high]), high)
     lower = np.append(np.flatnonzero(above[:, low]), low)
@@ -164,6 +215,8 @@ def _with_priority(
             found = _giving_way(low, high, above, motions, planning)
             conflict[high] = conflict[:, high] = planning.conflicts(high, motions)
         if found is None:
+            reason |= above[r]
+            reason[r] = True
             return None
         motions[r] = found
         conflict[r] = conflict[:, r] = planning.conflicts(r, motions)

@@ -62,8 +62,8 @@ robot: most orders of robots are found with few, so that after these another rou
 other paths, promise more than further orders."""
 
 ROUNDS_ALONE = 2
-"""Rounds in which a robot's motion without regard to the others is searched for: one
-more than with regard to them, as all else depends on it."""
+"""Rounds in which motions are searched for that may meet others: one more than for
+those that may not, as all else depends on them."""
 
 SHORTENING_MOST = 2_000
 """Nodes of a search that is to shorten a motion, at least: where two unicycles change

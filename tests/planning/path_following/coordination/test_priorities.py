@@ -161,6 +161,16 @@ def test_conflicts_of_robots_with_priorities_come_before_sooner_ones() -> None:
     assert [r < 3 for r in planning.asked] == [True, True, True, False]
 
 
+def test_other_orders_are_not_tried_of_robots_that_have_nothing_to_do_with_it() -> None:
+    # 3 and 4 cannot both cross, in whatever order the others do.
+    planning = TwoCrossings([3, 3, 4, 9, 9], [9, 9, 9, 0, 0])
+    alone = [planning.motion(r, 0) for r in range(5)]
+    assert search_priorities(alone, planning, 1000, np.zeros(1, bool)) is None
+    two = Crossing([9, 9], [0, 0])
+    assert search_priorities(alone[3:], two, 1000, np.zeros(1, bool)) is None
+    assert sum(r > 2 for r in planning.asked) == len(two.asked)
+
+
 class Shuttle:
     """Robot 2 is in the way of 0 or of 1, and goes to and fro to let them pass."""
 
