@@ -149,6 +149,32 @@ def test_no_node_is_looked_at_where_another_robot_fills_the_only_way(
     assert planning.find(0, stands, np.zeros(2, bool)) is not None
 
 
+def test_who_finds_no_motion_with_regard_to_others_has_one_without(
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    finish = {"circle": {"center": [20, 10], "radius": 0.5}}
+    poses = {"a": [4, 10, 0], "b": [8, 14, 0]}
+    robots = [
+        {"id": name, "model": "car", "pose": pose, "finish": finish}
+        for name, pose in poses.items()
+    ]
+    problem = state(yard(goals=[], robots=robots), samples=50)
+    paths = [no_path(problem, r) for r in range(2)]
+    planning = coordination._Planning(problem, [[0], [1]], paths, [None] * 2, 2000)
+    find, asked = planning.find, []
+
+    def in_vain(r: int, motions: list[Motion | None], above: np.ndarray) -> object:
+        asked.append((r, planning.round))
+        return find(r, motions, above) if motions == [None] * 2 else None
+
+    monkeypatch.setattr(planning, "find", in_vain)
+    found = planning.find_alone([0, 1], [None] * 2, ROUNDS[0], np.zeros(1, bool))
+    assert found is not None
+    assert asked == [(0, ROUNDS[0]), (1, ROUNDS[0]), (1, ROUNDS[1])]
+
+
 @pytest.mark.parametrize("model", ["car", "diffdrive", "husky"])
 @pytest.mark.parametrize("aimed", [False, True])
 def test_long_tours_lead_round_robots_that_stand(

@@ -171,6 +171,14 @@ def test_other_orders_are_not_tried_of_robots_that_have_nothing_to_do_with_it() 
     assert sum(r > 2 for r in planning.asked) == len(two.asked)
 
 
+def test_two_of_which_neither_can_wait_end_the_search_soon() -> None:
+    # 3 and 5 cross at once; the others are in each other's way before, and in theirs.
+    planning = Crossing([4, 5, 4, 5, 3, 5], [2, 1, 0, 0, 1, 0])
+    alone = [planning.motion(r, 0) for r in range(6)]
+    assert search_priorities(alone, planning, 2000, np.zeros(1, bool)) is None
+    assert len(planning.asked) < 50
+
+
 class Shuttle:
     """Robot 2 is in the way of 0 or of 1, and goes to and fro to let them pass."""
 
