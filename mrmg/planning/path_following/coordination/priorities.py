@@ -10,7 +10,8 @@ algorithms for the constraint satisfaction problem, Computational Intelligence 9
 1993), and from then on looks at these two first (C. Lecoutre, L. Sais, S. Tabary,
 V. Vidal: Reasoning from last conflict(s) in constraint programming, Artificial
 Intelligence 173, 2009): in a large fleet, most choices have nothing to do with each
-other.
+other. Robots that a motion may meet, at a cost, do not count among those that had to do
+with it: an order that only they would change may be missed.
 """
 
 from __future__ import annotations
