@@ -18,6 +18,9 @@ The figures of CL-CBS, from `reference.csv` in the folder if it is there, are me
 over the files that it solved, and so are ours beside them; its steps count as 1 s.
 Exit code 1 if less than 99 % are solved within --limit.
 
+With --draw, seeded missions take the place of files: 50 cars on 100 x 100 m without
+discs, 2 m apart where they start and where they end, on ways twice as long as there.
+
 Finished plans are kept in --output FILE: the same command goes on from there after an
 interruption. Rows of --json: `cell`, `files`, `solved` of `runs`, `plan_s_median`,
 `plan_s_worst`, `makespan_s_median`, and over the files that CL-CBS solved
@@ -95,6 +98,9 @@ CAR = {
     },
 }  # fmt: skip
 
+DRAWN_CARS, DRAWN_SIDE_M, DRAWN_APART_M = 50, 100, 2.0
+"""Of a mission that is drawn: its cars, side of its map, and how far apart they are."""
+
 ENOUGH = 0.99
 """Share of the runs that must be solved."""
 
@@ -110,18 +116,23 @@ def main() -> int:
     parser.add_argument(
         "--limit", type=float, default=60.0, metavar="S", help="of a plan, default 60"
     )
+    parser.add_argument("--draw", type=seed_range, help="first-last of drawn missions")
     add_file_options(parser)
     options = parser.parse_args()
-    files = sorted(p for p in options.folder.glob("*.yaml") if options.only in p.name)
-    if not files:
+    if options.draw:
+        contents = {f"map_drawn_ex{number}": drawn(number) for number in options.draw}
+    else:
+        files = sorted(options.folder.glob("*.yaml"))
+        contents = {path.stem: yaml.safe_load(path.read_text()) for path in files}
+    contents = {name: one for name, one in contents.items() if options.only in name}
+    if not contents:
         print(f"no benchmark files in {options.folder}", file=sys.stderr)
         return 1
     print(__doc__)
-    contents = {path: yaml.safe_load(path.read_text()) for path in files}
-    overlapping = [path.stem for path in files if overlap_m(contents[path]) > 0.0]
+    overlapping = [name for name, one in contents.items() if overlap_m(one) > 0.0]
     for name in overlapping:
         print(f"not counted, a car overlaps a disc where it starts: {name}")
-    counted = [path for path in files if path.stem not in overlapping]
+    counted = [name for name in contents if name not in overlapping]
     compile_kernels(PATH_FOLLOWING)
     load_kernels(PATH_FOLLOWING)
     trials = Trials(options.output, limit=options.limit)
@@ -129,12 +140,12 @@ def main() -> int:
         model = write_model(Path(folder))
         rows = [
             trials.row(
-                partial(planned, path.stem, contents[path], model, seed, options.limit),
-                file=path.stem,
-                digest=storage.bytes_digest(path.read_bytes()),
+                partial(planned, name, contents[name], model, seed, options.limit),
+                file=name,
+                digest=storage.bytes_digest(yaml.safe_dump(contents[name]).encode()),
                 seed=seed,
             )
-            for path in counted
+            for name in counted
             for seed in options.seeds
         ]
     table = tabulate(rows, read_reference(options.folder))
@@ -152,6 +163,27 @@ def body(pose: Sequence[float]) -> shapely.Polygon:
     corners = np.array(CAR["footprint"])
     turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
     return shapely.Polygon(corners @ turn + (x, y))
+
+
+def drawn(number: int) -> dict[str, Any]:
+    """Return a mission as a file would have it."""
+    rng = np.random.default_rng(number)
+    cars = enumerate(zip(drawn_poses(rng), drawn_poses(rng), strict=True))
+    agents = [{"name": f"agent{i}", "start": a, "goal": b} for i, (a, b) in cars]
+    size = [DRAWN_SIDE_M, DRAWN_SIDE_M]
+    return {"agents": agents, "map": {"dimensions": size, "obstacles": []}}
+
+
+def drawn_poses(rng: np.random.Generator) -> list[list[float]]:
+    """Return poses of all cars, (x, y, yaw), which stay clear of each other."""
+    poses, bodies = list[list[float]](), list[shapely.Polygon]()
+    while len(poses) < DRAWN_CARS:
+        x, y = rng.integers(2, DRAWN_SIDE_M - 1, 2)
+        pose = [float(x), float(y), float(rng.choice((-1.57, 0.0, 1.57, 3.14)))]
+        if all(body(pose).distance(one) >= DRAWN_APART_M for one in bodies):
+            poses.append(pose)
+            bodies.append(body(pose))
+    return poses
 
 
 def start_clearance_m(content: Mapping[str, Any]) -> float:

@@ -64,6 +64,16 @@ def test_bodies_reach_over_the_edge_by_the_margin_of_the_file(
     assert west == pytest.approx(-1.0 - margin_m)
 
 
+def test_missions_are_drawn_with_room_between_the_cars() -> None:
+    content = bench_clmapf.drawn(3)
+    assert content == bench_clmapf.drawn(3) != bench_clmapf.drawn(4)
+    for place in ("start", "goal"):
+        bodies = [bench_clmapf.body(agent[place]) for agent in content["agents"]]
+        assert len(bodies) == bench_clmapf.DRAWN_CARS
+        near = [a.distance(b) for a in bodies for b in bodies if a is not b]
+        assert min(near) >= bench_clmapf.DRAWN_APART_M
+
+
 def test_yaw_is_clockwise_in_the_files() -> None:
     west, south, east, north = bench_clmapf.body([5.0, 5.0, 1.5708]).bounds
     assert [west, south, east, north] == pytest.approx([4, 3, 6, 6], abs=1e-3)

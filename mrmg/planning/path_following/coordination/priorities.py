@@ -7,7 +7,7 @@ two motions conflict, one child gives one robot priority and the other child the
 one. The search goes depth first. Where both orders of two robots lead nowhere, it goes
 back to the last choice between robots that had to do with it (P. Prosser: Hybrid
 algorithms for the constraint satisfaction problem, Computational Intelligence 9(3),
-1993), and from then on looks at these two first (C. Lecoutre, L. Sais, S. Tabary,
+1993), and from then on looks at these two first (C. Lecoutre, L. Saïs, S. Tabary,
 V. Vidal: Reasoning from last conflict(s) in constraint programming, Artificial
 Intelligence 173, 2009): in a large fleet, most choices have nothing to do with each
 other. Robots that a motion may meet, at a cost, do not count among those that had to do
